@@ -1,0 +1,1 @@
+//! Sensor-fault-tolerant control of switched linear systems.
