@@ -1,0 +1,1 @@
+//! Off line: gains, observers, predictor and certificate.
