@@ -1,1 +1,22 @@
 //! Off line: gains, observers, predictor and certificate.
+//!
+//! The data types and the certificate need no solver; making gains does (feature `design`).
+
+pub mod augmented;
+pub mod certificate;
+#[cfg(feature = "design")]
+pub mod lmi;
+mod lyapunov;
+mod spec;
+pub mod state_feedback;
+mod units;
+mod verdict;
+
+pub use certificate::{CertificateError, ControlCertificate};
+pub use lyapunov::{DwellTime, Lyapunov};
+pub use spec::{ControlSpec, Objective, ObserverKind, ObserverSpec};
+pub use state_feedback::{ModeGains, StateFeedback};
+pub use units::Units;
+pub use verdict::{
+    Advice, BlockKind, BlockName, ConflictingBlock, DesignError, Infeasibility, SolverFailure,
+};
