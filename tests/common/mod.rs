@@ -170,6 +170,7 @@ pub fn controller(channel: Channel, noise: f64) -> ControllerParameters {
         estimator: Estimator {
             method: EstimatorMethod::Reference,
             response_length: length,
+            window: 2 * (length + 1) + 20,
             predictors,
             harmonics: Some(Harmonics {
                 period: core::f64::consts::TAU / 0.02,
