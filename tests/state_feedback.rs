@@ -1,8 +1,8 @@
 //! Theorems T1 and T2: optima, verdicts, and what the gains really do.
 
-mod common;
+mod plants;
 
-use common::{Channel, paper, paper_spec};
+use plants::{Channel, paper, paper_spec};
 use ftc::design::state_feedback::synthesise;
 use ftc::design::{DesignError, Lyapunov};
 use ftc::plant::scaling::Scaling;

@@ -1,78 +1,190 @@
-//! Plants the tests share.
-#![allow(dead_code)] // each test file uses its own part
+//! The paper's example, built by hand: plant, scenario and a controller with fixed gains.
+#![allow(dead_code, missing_docs)]
 
-use ftc::design::{ControlSpec, Lyapunov};
+use ftc::control::ControllerParameters;
+use ftc::control::parameters::{
+    Compensation, Estimator, EstimatorMethod, FeedbackGains, Gain, Harmonics, Limits, Observer,
+    ObserverKind, StateFeedback,
+};
+use ftc::design::commissioning;
 use ftc::plant::{Mode, OperatingPoint, SwitchedPlant};
-use nalgebra::DMatrix;
+use ftc::simulate::Scenario;
+use ftc::simulate::scenario::{ModeInterval, Waveform};
+use nalgebra::{DMatrix, dmatrix};
 
-/// Where the paper's disturbance enters.
+/// Where the disturbance enters.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Channel {
     State,
     Output,
 }
 
-/// A matrix from its rows.
-pub fn rows<const R: usize, const C: usize>(rows: [[f64; C]; R]) -> DMatrix<f64> {
-    DMatrix::from_fn(R, C, |r, c| rows[r][c])
-}
-
-/// A mode around the origin.
-pub fn mode(
-    a: DMatrix<f64>,
-    b: DMatrix<f64>,
-    c: DMatrix<f64>,
-    e: DMatrix<f64>,
-    f: DMatrix<f64>,
-) -> Mode {
-    Mode {
-        name: String::new(),
-        operating_point: OperatingPoint::zero(a.nrows(), b.ncols(), c.nrows()),
+pub fn plant(channel: Channel) -> SwitchedPlant {
+    let (e, f) = match channel {
+        Channel::State => (dmatrix![1.0; 1.0], dmatrix![0.0; 0.0]),
+        Channel::Output => (dmatrix![0.0; 0.0], dmatrix![1.0; 1.0]),
+    };
+    let mode = |name: &str, a: DMatrix<f64>, b: DMatrix<f64>| Mode {
+        name: name.into(),
         a,
         b,
-        c,
-        e,
-        f,
-    }
-}
-
-/// The plant of the paper's section VII-A.
-pub fn paper(channel: Channel) -> SwitchedPlant {
-    let (e, f) = match channel {
-        Channel::State => (rows([[1.0], [1.0]]), rows([[0.0], [0.0]])),
-        Channel::Output => (rows([[0.0], [0.0]]), rows([[1.0], [1.0]])),
+        c: DMatrix::identity(2, 2),
+        e: e.clone(),
+        f: f.clone(),
+        operating_point: OperatingPoint::zero(2, 2, 2),
     };
-    let c = DMatrix::identity(2, 2);
-    let first = mode(
-        rows([[0.6, 0.45], [-0.2, 0.3]]),
-        rows([[0.0, 1.0], [1.0, 0.0]]),
-        c.clone(),
-        e.clone(),
-        f.clone(),
-    );
-    let second = mode(
-        rows([[0.4, -0.3], [0.11, 0.0]]),
-        rows([[1.0, 0.0], [0.0, 1.0]]),
-        c,
-        e,
-        f,
-    );
     SwitchedPlant {
         sample_time: 1.0,
-        modes: vec![first, second],
+        modes: vec![
+            mode(
+                "first",
+                dmatrix![0.6, 0.45; -0.2, 0.3],
+                dmatrix![0.0, 1.0; 1.0, 0.0],
+            ),
+            mode(
+                "second",
+                dmatrix![0.4, -0.3; 0.11, 0.0],
+                DMatrix::identity(2, 2),
+            ),
+        ],
     }
 }
 
-/// The weights of the reference table: 1 on the output, 0.3 on the integral, 0.1 on the input.
-pub fn paper_spec(latency: usize, decay: f64, lyapunov: Lyapunov) -> ControlSpec {
-    let dims = paper(Channel::State).dimensions();
-    ControlSpec {
-        latency,
-        decay,
-        lyapunov,
-        output_weight: vec![1.0; 2],
-        integral_weight: vec![0.3; 2],
-        input_weight: vec![0.1; 2],
-        ..ControlSpec::new(dims)
+pub const REFERENCES: [&str; 4] = ["constant", "square", "sine", "levels"];
+
+pub fn reference(name: &str) -> Waveform {
+    match name {
+        "constant" => Waveform::Constant { value: 0.6 },
+        "square" => Waveform::Square {
+            amplitude: 0.6,
+            period: 400.0,
+            offset: 0.0,
+        },
+        "sine" => Waveform::Sine {
+            amplitude: 0.6,
+            period: 400.0,
+            phase: 0.0,
+            offset: 0.0,
+        },
+        _ => Waveform::Steps {
+            points: vec![[0.0, 0.4], [300.0, 0.8], [700.0, -0.2], [1200.0, 0.5]],
+        },
+    }
+}
+
+pub fn scenario(reference: Waveform, noise: f64, disturbances: usize) -> Scenario {
+    let fault = Waveform::Steps {
+        points: vec![[101.0, 0.5], [401.0, 0.0], [1001.0, 0.5]],
+    };
+    Scenario {
+        steps: 1600,
+        noise: vec![noise; 2],
+        seed: 42,
+        schedule: vec![
+            ModeInterval { from: 0.0, mode: 0 },
+            ModeInterval {
+                from: 800.0,
+                mode: 1,
+            },
+        ],
+        reference: vec![reference; 2],
+        fault: vec![fault; 2],
+        events: vec![],
+        disturbance: vec![
+            Waveform::Sine {
+                amplitude: 0.04,
+                period: core::f64::consts::TAU / 0.02,
+                phase: 0.0,
+                offset: 0.0
+            };
+            disturbances
+        ],
+    }
+}
+
+/// Gains from a linear-quadratic design, rounded by hand; an observer that forgets 80 % a sample.
+pub fn controller(channel: Channel, noise: f64) -> ControllerParameters {
+    let plant = plant(channel);
+    let gains = |state_feedback, integral| FeedbackGains {
+        state_feedback,
+        integral,
+        previous_input: DMatrix::zeros(2, 0),
+        anti_windup: DMatrix::zeros(2, 2),
+    };
+    let decoupling = match channel {
+        Channel::State => DMatrix::from_element(2, 2, 0.5),
+        Channel::Output => DMatrix::zeros(2, 2),
+    };
+    let length = commissioning::response_length(&plant.modes).unwrap();
+    let samples = length + commissioning::commissioning_samples(2, length);
+    let predictors: Vec<_> = plant
+        .modes
+        .iter()
+        .zip(1..)
+        .map(|(mode, seed)| {
+            let database = commissioning::commission(mode, &[1.0, 1.0], &[noise; 2], samples, seed);
+            commissioning::predictor(&database, length).unwrap()
+        })
+        .collect();
+    let observer_gains = plant
+        .modes
+        .iter()
+        .map(|mode| {
+            let t = DMatrix::identity(2, 2) - &decoupling * &mode.c;
+            Gain(t * &mode.a * 0.8)
+        })
+        .collect();
+    let thresholds = (0..2)
+        .map(|s| {
+            predictors
+                .iter()
+                .map(|p| 6.0 * p.deviation[s])
+                .fold(1e-3, f64::max)
+        })
+        .collect();
+    ControllerParameters {
+        feedback: StateFeedback {
+            tracked: vec![0, 1],
+            latency: 0,
+            modes: vec![
+                gains(
+                    dmatrix![0.198, -0.555; -0.852, -0.446],
+                    dmatrix![0.0, 0.257; 0.257, -0.001],
+                ),
+                gains(
+                    dmatrix![-0.654, 0.297; -0.109, -0.257],
+                    dmatrix![0.257, 0.001; 0.0, 0.257],
+                ),
+            ],
+        },
+        observer: Observer {
+            kind: if channel == Channel::State {
+                ObserverKind::Uio
+            } else {
+                ObserverKind::Luenberger
+            },
+            note: None,
+            gains: observer_gains,
+            decoupling: vec![vec![Gain(decoupling.clone()); 2]; 2],
+        },
+        estimator: Estimator {
+            method: EstimatorMethod::Reference,
+            response_length: length,
+            window: 2 * (length + 1) + 20,
+            predictors,
+            harmonics: Some(Harmonics {
+                period: core::f64::consts::TAU / 0.02,
+                count: 1,
+                memory: 3000.0,
+                initial_variance: 1e6,
+            }),
+            thresholds,
+            debounce: 1,
+            leverage_limit: 100.0,
+            largest_fault: vec![1e6; 2],
+        },
+        compensation: Compensation::VirtualSensor,
+        input_limits: vec![Limits::default(); 2],
+        plant,
     }
 }

@@ -1,0 +1,11 @@
+//! Trying the loop before trusting it: a plant under a scenario, the closed loop, its figures of merit.
+
+pub mod closed_loop;
+pub mod metrics;
+pub mod noise;
+pub mod plant;
+pub mod scenario;
+
+pub use closed_loop::{Trajectory, Variant, run};
+pub use plant::{PlantSimulator, PlantState};
+pub use scenario::Scenario;
