@@ -4,6 +4,8 @@
 //! certified for it ([`design`]), the controller runs on line ([`control`]), and the loop is
 //! tried before it is trusted ([`simulate`]).
 
+pub mod control;
 pub mod design;
 pub mod plant;
 pub mod rows;
+pub mod simulate;

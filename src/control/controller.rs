@@ -1,0 +1,291 @@
+//! The controller: estimator, compensation, observer, state feedback and integrator, composed.
+
+use super::compensation::{self, AdditiveControl};
+use super::estimator::{EstimatorState, Observation};
+use super::integrator;
+use super::kernel;
+use super::observer::{ObservedMode, ObserverState};
+use super::parameters::{Compensation, ControllerParameters, Limits};
+use nalgebra::DMatrix;
+use serde::{Deserialize, Serialize};
+
+/// A controller ready to run: immutable, shared by any number of [`ControllerState`]s.
+#[derive(Clone, Debug)]
+pub struct Controller {
+    parameters: ControllerParameters,
+    modes: Vec<ObservedMode>,
+    /// `K_i C_i^+` per mode (m x p), for the printed additive control.
+    static_gains: Vec<DMatrix<f64>>,
+}
+
+/// What a tick is told.
+#[derive(Clone, Copy, Debug)]
+pub struct Sample<'a> {
+    /// Number of the tick, counted from the start time.
+    pub tick: u64,
+    /// Active mode (0-based); an unknown one is taken as the nearest known.
+    pub mode: usize,
+    /// Measurement `y` (p); a value that is not finite is a fault of that sensor.
+    pub measurement: &'a [f64],
+    /// Reference `y_ref` (r).
+    pub reference: &'a [f64],
+    /// Decision thresholds (p).
+    pub thresholds: &'a [f64],
+    /// Which fault to take out of the loop.
+    pub compensate: Compensate<'a>,
+}
+
+/// The fault that is taken out of the loop.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Compensate<'a> {
+    /// None: the controller believes its sensors.
+    Nothing,
+    /// The estimate `f_hat`.
+    Estimate,
+    /// The true fault (p), which only a simulation can know: the bound no estimator can beat.
+    Known(&'a [f64]),
+}
+
+/// Everything that changes while the controller runs. A copy of it is a complete snapshot.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct ControllerState {
+    /// Mode of the last tick; none before the first.
+    mode: Option<usize>,
+    /// State observer.
+    pub observer: ObserverState,
+    /// Fault estimator.
+    pub estimator: EstimatorState,
+    /// Integrator state `Z` (r).
+    pub integral: Vec<f64>,
+    /// The printed additive control, where it is chosen.
+    additive: Option<AdditiveControl>,
+    /// Command `u` (m).
+    pub command: Vec<f64>,
+    /// Corrected measurement `y_c` (p).
+    pub corrected: Vec<f64>,
+    /// The command acting over the coming sample (m).
+    acting: Vec<f64>,
+    /// Deviation scratch (n or m).
+    deviation: Vec<f64>,
+    /// What saturation took off the command (m).
+    excess: Vec<f64>,
+    /// What stands in for a measurement that is not a number (p).
+    substitute: Vec<f64>,
+    /// A fault of zero (p).
+    no_fault: Vec<f64>,
+}
+
+impl Controller {
+    /// Prepares a controller; the parameters' sizes must agree with the plant's.
+    pub fn new(parameters: ControllerParameters) -> Self {
+        let modes = parameters
+            .plant
+            .modes
+            .iter()
+            .map(|mode| ObservedMode {
+                a: mode.a.clone(),
+                b: mode.b.clone(),
+                c: mode.c.clone(),
+                state_offset: mode.state_offset().iter().copied().collect(),
+                output_offset: mode.output_offset().iter().copied().collect(),
+            })
+            .collect();
+        let static_gains = parameters
+            .plant
+            .modes
+            .iter()
+            .zip(&parameters.feedback.modes)
+            .map(|(mode, gains)| &gains.state_feedback * pseudo_inverse(&mode.c))
+            .collect();
+        Self {
+            parameters,
+            modes,
+            static_gains,
+        }
+    }
+
+    /// What this controller was built from.
+    pub fn parameters(&self) -> &ControllerParameters {
+        &self.parameters
+    }
+
+    /// The state before the first tick in `mode` (0-based): at rest at its operating point.
+    pub fn initial_state(&self, mode: usize) -> ControllerState {
+        let dims = self.parameters.plant.dimensions();
+        let tracked = self.parameters.feedback.tracked.len();
+        let point = &self.parameters.plant.modes[mode].operating_point;
+        ControllerState {
+            mode: None,
+            observer: ObserverState::new(&point.x, dims.outputs),
+            estimator: EstimatorState::new(&self.parameters.estimator, &point.u, dims.outputs),
+            integral: vec![0.0; tracked],
+            additive: (self.parameters.compensation == Compensation::Additive)
+                .then(|| AdditiveControl::new(tracked, dims.inputs)),
+            command: point.u.clone(),
+            corrected: point.y.clone(),
+            acting: point.u.clone(),
+            deviation: vec![0.0; dims.states.max(dims.inputs)],
+            excess: vec![0.0; dims.inputs],
+            substitute: vec![0.0; dims.outputs],
+            no_fault: vec![0.0; dims.outputs],
+        }
+    }
+
+    /// One tick: takes the sample and leaves the command in `state.command`.
+    pub fn tick(&self, state: &mut ControllerState, sample: &Sample<'_>) {
+        let mode = sample.mode.min(self.modes.len().saturating_sub(1));
+        let (Some(model), Some(described)) =
+            (self.modes.get(mode), self.parameters.plant.modes.get(mode))
+        else {
+            return;
+        };
+        let point = &described.operating_point;
+        let left = self.enter(state, mode);
+        state.estimator.observe(
+            &self.parameters.estimator,
+            &Observation {
+                tick: sample.tick,
+                mode,
+                u0: &point.u,
+                y0: &point.y,
+                y: sample.measurement,
+                thresholds: sample.thresholds,
+            },
+        );
+        self.correct_measurement(state, model, sample);
+        state.observer.correct(
+            &self.parameters.observer,
+            model,
+            left,
+            mode,
+            &state.corrected,
+        );
+        self.command(state, mode, &point.x, &point.u, sample.compensate);
+        self.advance(state, model, mode, sample);
+    }
+
+    /// Notes the mode and returns the one just left.
+    fn enter(&self, state: &mut ControllerState, mode: usize) -> usize {
+        let left = state.mode.replace(mode).unwrap_or(mode);
+        if left != mode {
+            state.estimator.mode_entered(&self.parameters.estimator);
+        }
+        left
+    }
+
+    /// `y_c`: the measurement without the fault; a lost sensor is replaced by what is expected of it.
+    fn correct_measurement(
+        &self,
+        state: &mut ControllerState,
+        model: &ObservedMode,
+        sample: &Sample<'_>,
+    ) {
+        if state.estimator.can_predict(&self.parameters.estimator) {
+            kernel::copy(&mut state.substitute, &state.estimator.prediction);
+        } else {
+            state.observer.expected_output(model, &mut state.substitute);
+        }
+        let fault = match sample.compensate {
+            Compensate::Known(fault) => fault,
+            Compensate::Estimate if self.parameters.compensation == Compensation::VirtualSensor => {
+                &state.estimator.fault
+            }
+            Compensate::Estimate | Compensate::Nothing => &state.no_fault,
+        };
+        compensation::correct(
+            &mut state.corrected,
+            sample.measurement,
+            fault,
+            &state.substitute,
+        );
+        kernel::bound(&mut state.corrected);
+    }
+
+    /// `u = u0 + K (x_hat - x0) + G Z + V (u_prev - u0)`, clamped to the input's limits.
+    fn command(
+        &self,
+        state: &mut ControllerState,
+        mode: usize,
+        x0: &[f64],
+        u0: &[f64],
+        compensate: Compensate<'_>,
+    ) {
+        let Some(gains) = self.parameters.feedback.modes.get(mode) else {
+            return;
+        };
+        if self.parameters.feedback.latency > 0 {
+            kernel::copy(&mut state.acting, &state.command);
+        }
+        kernel::copy(&mut state.command, u0);
+        kernel::difference(&mut state.deviation, &state.observer.estimate, x0);
+        kernel::add_product(&mut state.command, &gains.state_feedback, &state.deviation);
+        kernel::add_product(&mut state.command, &gains.integral, &state.integral);
+        kernel::difference(&mut state.deviation, &state.acting, u0);
+        kernel::add_product(&mut state.command, &gains.previous_input, &state.deviation);
+        if let Some(additive) = &mut state.additive
+            && compensate == Compensate::Estimate
+            && let Some(gain) = self.static_gains.get(mode)
+        {
+            let fault = &state.estimator.fault;
+            additive.add_to(&mut state.command, gain, &gains.integral, fault);
+            additive.advance(
+                self.parameters.plant.sample_time,
+                &self.parameters.feedback.tracked,
+                fault,
+            );
+        }
+        saturate(
+            &mut state.command,
+            &mut state.excess,
+            &self.parameters.input_limits,
+        );
+    }
+
+    /// Moves observer, integrator and input history to the next sample.
+    fn advance(
+        &self,
+        state: &mut ControllerState,
+        model: &ObservedMode,
+        mode: usize,
+        sample: &Sample<'_>,
+    ) {
+        let feedback = &self.parameters.feedback;
+        if feedback.latency == 0 {
+            kernel::copy(&mut state.acting, &state.command);
+        }
+        if let Some(gain) = self.parameters.observer.gains.get(mode) {
+            state
+                .observer
+                .predict(&gain.0, model, &state.acting, &state.corrected);
+        }
+        if let Some(gains) = feedback.modes.get(mode) {
+            integrator::advance(
+                &mut state.integral,
+                self.parameters.plant.sample_time,
+                sample.reference,
+                &state.corrected,
+                &feedback.tracked,
+                gains,
+                &state.excess,
+            );
+        }
+        state.estimator.remember(&state.acting);
+    }
+}
+
+/// Clamps each command to its limits and keeps in `excess` what was taken off (clamped - wanted).
+fn saturate(command: &mut [f64], excess: &mut [f64], limits: &[Limits]) {
+    for ((value, taken), limit) in command.iter_mut().zip(excess).zip(limits) {
+        let wanted = kernel::bounded(*value);
+        *value = limit.clamp(wanted);
+        *taken = *value - wanted;
+    }
+}
+
+/// The Moore-Penrose inverse.
+fn pseudo_inverse(matrix: &DMatrix<f64>) -> DMatrix<f64> {
+    let svd = matrix.clone().svd(true, true);
+    let tolerance = 1e-12 * svd.singular_values.max();
+    svd.pseudo_inverse(tolerance)
+        .unwrap_or_else(|_| matrix.transpose() * 0.0)
+}

@@ -1,0 +1,119 @@
+//! The response to the periodic disturbance, learned while no fault is declared.
+//!
+//! With the period known, the disturbance adds to each output a sum of sines and cosines whose
+//! coefficients are not known beforehand. Recursive least squares with forgetting learns them;
+//! the regressor is the same for every sensor, so one covariance serves all. While a fault is
+//! declared nothing is learned and the last coefficients extrapolate.
+
+use crate::control::kernel;
+use crate::control::parameters::Harmonics;
+use serde::{Deserialize, Serialize};
+
+/// Learned coefficients of one mode, with `q = 2 x harmonics` regressors.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct HarmonicState {
+    /// Coefficients per sensor (p x q, row after row).
+    coefficients: Vec<f64>,
+    /// Covariance in units of the noise variance (q x q, symmetric).
+    covariance: Vec<f64>,
+    /// `[sin(w k), cos(w k), sin(2 w k), ...]` (q).
+    regressor: Vec<f64>,
+    /// Covariance times regressor (q).
+    direction: Vec<f64>,
+}
+
+impl HarmonicState {
+    /// Nothing learned yet.
+    pub fn new(harmonics: &Harmonics, outputs: usize) -> Self {
+        let size = 2 * harmonics.count;
+        let mut covariance = vec![0.0; size * size];
+        covariance
+            .iter_mut()
+            .step_by(size + 1)
+            .for_each(|v| *v = harmonics.initial_variance);
+        Self {
+            coefficients: vec![0.0; outputs * size],
+            covariance,
+            regressor: vec![0.0; size],
+            direction: vec![0.0; size],
+        }
+    }
+
+    /// Sets the regressor of tick `tick`.
+    pub fn rotate(&mut self, harmonics: &Harmonics, tick: u64) {
+        let turns = libm::fmod(tick as f64, harmonics.period) / harmonics.period;
+        for (index, pair) in self.regressor.chunks_exact_mut(2).enumerate() {
+            let angle = core::f64::consts::TAU * turns * (index + 1) as f64;
+            if let [sine, cosine] = pair {
+                (*sine, *cosine) = libm::sincos(angle);
+            }
+        }
+    }
+
+    /// Adds the learned response to `outputs` (p).
+    pub fn add_response(&self, outputs: &mut [f64]) {
+        let size = self.regressor.len().max(1);
+        for (output, row) in outputs.iter_mut().zip(self.coefficients.chunks_exact(size)) {
+            *output += kernel::dot(row, &self.regressor);
+        }
+    }
+
+    /// Variance of the learned response, in units of the noise variance.
+    pub fn leverage(&mut self) -> f64 {
+        let size = self.regressor.len().max(1);
+        for (value, row) in self
+            .direction
+            .iter_mut()
+            .zip(self.covariance.chunks_exact(size))
+        {
+            *value = kernel::dot(row, &self.regressor);
+        }
+        kernel::dot(&self.direction, &self.regressor).max(0.0)
+    }
+
+    /// One step of recursive least squares on the residuals (p) of a healthy sample.
+    /// Call [`rotate`](Self::rotate) and [`leverage`](Self::leverage) of the same tick first.
+    pub fn learn(&mut self, harmonics: &Harmonics, residual: &[f64]) {
+        let size = self.regressor.len().max(1);
+        let keep = 1.0 - 1.0 / harmonics.memory.max(2.0);
+        let scale = 1.0 / (keep + kernel::dot(&self.direction, &self.regressor).max(0.0));
+        for (row, &error) in self.coefficients.chunks_exact_mut(size).zip(residual) {
+            kernel::add_scaled(row, scale * error, &self.direction);
+            kernel::bound(row);
+        }
+        for (row, &factor) in self.covariance.chunks_exact_mut(size).zip(&self.direction) {
+            kernel::add_scaled(row, -scale * factor, &self.direction);
+            row.iter_mut().for_each(|v| *v = kernel::bounded(*v / keep));
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn learns_amplitude_and_phase_of_every_harmonic() {
+        let harmonics = Harmonics {
+            period: 31.7,
+            count: 2,
+            memory: 400.0,
+            initial_variance: 1e6,
+        };
+        let mut state = HarmonicState::new(&harmonics, 1);
+        let truth = |k: u64| {
+            let angle = core::f64::consts::TAU * k as f64 / harmonics.period;
+            0.7 * libm::sin(angle + 0.3) - 0.2 * libm::sin(2.0 * angle + 1.1)
+        };
+        let mut error = f64::INFINITY;
+        for k in 0..200 {
+            state.rotate(&harmonics, k);
+            state.leverage();
+            let mut predicted = [0.0];
+            state.add_response(&mut predicted);
+            error = truth(k) - predicted[0];
+            state.learn(&harmonics, &[error]);
+        }
+        assert!(error.abs() < 1e-6, "still {error} off after six periods");
+    }
+}

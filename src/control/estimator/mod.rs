@@ -1,0 +1,205 @@
+//! The sensor-fault estimator: data-based projection with a reference window (41)-(62).
+//!
+//! A healthy database of inputs `U1` and outputs `Y1` fixes, by projection, what the output must
+//! be: `y_hat = y0 + Y1 U1^+ phi` ([`predictor`]). What the periodic disturbance adds is learned
+//! on line while all is well ([`harmonics`]). The residual is what remains; each sensor's residual
+//! is judged against its own threshold ([`decision`]), widened by how far the present input lies
+//! from those the database knows.
+
+mod decision;
+mod harmonics;
+mod predictor;
+mod window;
+
+pub use decision::{Decision, Verdict};
+pub use harmonics::HarmonicState;
+pub use predictor::{InputHistory, leverage};
+pub use window::SlidingWindow;
+
+use super::compensation::is_measurement;
+use super::kernel;
+use super::parameters::{Estimator, EstimatorMethod};
+use serde::{Deserialize, Serialize};
+
+/// One sample as the estimator sees it.
+#[derive(Clone, Copy, Debug)]
+pub struct Observation<'a> {
+    /// Number of the tick.
+    pub tick: u64,
+    /// Active mode (0-based).
+    pub mode: usize,
+    /// Input of the mode's operating point (m).
+    pub u0: &'a [f64],
+    /// Output of the mode's operating point (p).
+    pub y0: &'a [f64],
+    /// Measurement (p).
+    pub y: &'a [f64],
+    /// Decision thresholds (p).
+    pub thresholds: &'a [f64],
+}
+
+/// What the estimator remembers, and what it last said.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct EstimatorState {
+    history: InputHistory,
+    /// Ticks until the regressor again holds inputs of the present mode only.
+    hold: usize,
+    /// Per mode: the learned response to the periodic disturbance.
+    harmonics: Vec<HarmonicState>,
+    decisions: Vec<Decision>,
+    /// The window of the printed method, where it is chosen.
+    window: Option<SlidingWindow>,
+    /// Predicted output `y_hat` (p).
+    pub prediction: Vec<f64>,
+    /// Residual `r_c = y - y_hat` (p); keeps its last value where the measurement is not a number.
+    pub residual: Vec<f64>,
+    /// Fault estimate `f_hat` (p); zero while no fault is declared.
+    pub fault: Vec<f64>,
+    /// Whether a fault is declared, per sensor (p).
+    pub flagged: Vec<bool>,
+}
+
+impl EstimatorState {
+    /// Nothing seen yet: `inputs` is the command that has acted so far (m).
+    pub fn new(estimator: &Estimator, inputs: &[f64], outputs: usize) -> Self {
+        let modes = estimator.predictors.len().max(1);
+        let harmonics = (0..modes)
+            .filter_map(|_| {
+                estimator
+                    .harmonics
+                    .as_ref()
+                    .map(|h| HarmonicState::new(h, outputs))
+            })
+            .collect();
+        Self {
+            history: InputHistory::new(inputs, estimator.response_length),
+            hold: estimator.response_length,
+            harmonics,
+            window: (estimator.method == EstimatorMethod::Sliding).then(|| {
+                SlidingWindow::new(
+                    inputs.len() * estimator.response_length,
+                    outputs,
+                    estimator.window,
+                )
+            }),
+            decisions: vec![Decision::default(); outputs],
+            prediction: vec![0.0; outputs],
+            residual: vec![0.0; outputs],
+            fault: vec![0.0; outputs],
+            flagged: vec![false; outputs],
+        }
+    }
+
+    /// Called on entering a mode: the regressor mixes modes for `response_length` samples.
+    pub fn mode_entered(&mut self, estimator: &Estimator) {
+        self.hold = estimator.response_length;
+        if let Some(window) = &mut self.window {
+            window.clear();
+        }
+    }
+
+    /// Whether the prediction can be used in place of a measurement now.
+    pub fn can_predict(&self, estimator: &Estimator) -> bool {
+        estimator.method == EstimatorMethod::Reference && self.hold == 0
+    }
+
+    /// Judges one sample, sensor by sensor.
+    pub fn observe(&mut self, estimator: &Estimator, seen: &Observation<'_>) {
+        self.history.regress(seen.u0);
+        let widening = match estimator.method {
+            EstimatorMethod::Reference => self.predict(estimator, seen),
+            EstimatorMethod::Sliding => self.slide(seen),
+            EstimatorMethod::None => None,
+        };
+        let healthy = self.decide(estimator, seen, widening);
+        if healthy
+            && let Some(learned) = self.harmonics.get_mut(seen.mode)
+            && let Some(known) = &estimator.harmonics
+        {
+            learned.learn(known, &self.residual);
+        }
+        self.hold = self.hold.saturating_sub(1);
+    }
+
+    /// The reference window: leaves prediction and residual, and returns by how much to widen the
+    /// thresholds; nothing while the residual cannot be trusted.
+    fn predict(&mut self, estimator: &Estimator, seen: &Observation<'_>) -> Option<f64> {
+        let predictor = estimator.predictors.get(seen.mode)?;
+        kernel::affine(
+            &mut self.prediction,
+            seen.y0,
+            &predictor.response,
+            self.history.regressor(),
+        );
+        let leverage = self.history.leverage(&predictor.factor);
+        let mut spread = 1.0 + leverage;
+        if let Some(learned) = self.harmonics.get_mut(seen.mode)
+            && let Some(known) = &estimator.harmonics
+        {
+            learned.rotate(known, seen.tick);
+            learned.add_response(&mut self.prediction);
+            spread += learned.leverage();
+        }
+        kernel::bound(&mut self.prediction);
+        let pairs = self.residual.iter_mut().zip(seen.y).zip(&self.prediction);
+        for ((residual, &value), &predicted) in pairs {
+            if is_measurement(value) {
+                *residual = value - predicted;
+            }
+        }
+        let trusted = self.hold == 0 && leverage <= estimator.leverage_limit;
+        trusted.then(|| libm::sqrt(spread))
+    }
+
+    /// The sliding window as printed: leaves the residual; nothing until the window is full.
+    fn slide(&mut self, seen: &Observation<'_>) -> Option<f64> {
+        let window = self.window.as_mut().filter(|_| self.hold == 0)?;
+        window.residual(self.history.regressor(), seen.y, &mut self.residual);
+        window.full().then_some(1.0)
+    }
+
+    /// Remembers the input that acts over the coming sample (m).
+    pub fn remember(&mut self, acting: &[f64]) {
+        self.history.push(acting);
+    }
+
+    /// Decides sensor by sensor; `widening` is absent when the residual means nothing now.
+    /// Returns whether the residual was judged and every sensor found healthy.
+    fn decide(
+        &mut self,
+        estimator: &Estimator,
+        seen: &Observation<'_>,
+        widening: Option<f64>,
+    ) -> bool {
+        let mut healthy = widening.is_some();
+        let sensors = self
+            .decisions
+            .iter_mut()
+            .zip(&mut self.fault)
+            .zip(&mut self.flagged);
+        let signals = seen
+            .y
+            .iter()
+            .zip(&self.residual)
+            .zip(seen.thresholds.iter().zip(&estimator.largest_fault));
+        for (((decision, fault), flagged), ((&value, &residual), (&threshold, &largest))) in
+            sensors.zip(signals)
+        {
+            let verdict = if !is_measurement(value) {
+                Some(Verdict::Lost)
+            } else {
+                widening.map(|factor| Verdict::of(residual, factor * threshold))
+            };
+            let Some(verdict) = verdict else { continue };
+            decision.update(verdict, estimator.debounce);
+            *flagged = decision.flagged();
+            *fault = match (*flagged, verdict) {
+                (false, _) => 0.0,
+                (true, Verdict::Lost) => *fault,
+                (true, _) => residual.clamp(-largest, largest),
+            };
+            healthy &= !*flagged && verdict == Verdict::Healthy;
+        }
+        healthy
+    }
+}

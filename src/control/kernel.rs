@@ -1,0 +1,97 @@
+//! The few vector operations of the on-line path: contiguous slices, no allocation, no panic.
+//!
+//! Sums run column by column in a fixed order, so a result depends on its inputs alone.
+
+use nalgebra::DMatrix;
+
+/// The largest magnitude any on-line quantity may take; far beyond physics, far below overflow.
+pub const LARGEST: f64 = 1e100;
+
+/// `value` forced into the finite range `[-LARGEST, LARGEST]`; not-a-number becomes zero.
+///
+/// Magnitudes below the smallest normal number become zero too: a state that decays for ever
+/// would otherwise end in denormals, which are several times slower to compute with.
+pub fn bounded(value: f64) -> f64 {
+    if value.is_nan() || value.abs() < f64::MIN_POSITIVE {
+        0.0
+    } else {
+        value.clamp(-LARGEST, LARGEST)
+    }
+}
+
+/// Applies [`bounded`] to every entry.
+pub fn bound(values: &mut [f64]) {
+    for value in values {
+        *value = bounded(*value);
+    }
+}
+
+/// `out += matrix * vector`.
+pub fn add_product(out: &mut [f64], matrix: &DMatrix<f64>, vector: &[f64]) {
+    let rows = matrix.nrows().max(1);
+    for (column, &factor) in matrix.as_slice().chunks_exact(rows).zip(vector) {
+        add_scaled(out, factor, column);
+    }
+}
+
+/// `out = start + matrix * vector`.
+pub fn affine(out: &mut [f64], start: &[f64], matrix: &DMatrix<f64>, vector: &[f64]) {
+    copy(out, start);
+    add_product(out, matrix, vector);
+}
+
+/// `out += factor * vector`.
+pub fn add_scaled(out: &mut [f64], factor: f64, vector: &[f64]) {
+    for (sum, &value) in out.iter_mut().zip(vector) {
+        *sum += factor * value;
+    }
+}
+
+/// `out = left - right`.
+pub fn difference(out: &mut [f64], left: &[f64], right: &[f64]) {
+    for ((result, &l), &r) in out.iter_mut().zip(left).zip(right) {
+        *result = l - r;
+    }
+}
+
+/// Copies as many entries as both hold.
+pub fn copy(out: &mut [f64], source: &[f64]) {
+    for (to, &from) in out.iter_mut().zip(source) {
+        *to = from;
+    }
+}
+
+/// Inner product.
+pub fn dot(left: &[f64], right: &[f64]) -> f64 {
+    left.iter().zip(right).map(|(l, r)| l * r).sum()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use nalgebra::DVector;
+    use proptest::prelude::*;
+
+    proptest! {
+        #[test]
+        fn products_agree_with_nalgebra(
+            rows in 1usize..7, columns in 0usize..7,
+            entries in prop::collection::vec(-10.0..10.0f64, 49), x in prop::collection::vec(-10.0..10.0f64, 7),
+        ) {
+            let matrix = DMatrix::from_fn(rows, columns, |r, c| entries[7 * r + c]);
+            let vector = &x[..columns];
+            let mut out = vec![1.0; rows];
+            add_product(&mut out, &matrix, vector);
+            let expected = DVector::repeat(rows, 1.0) + &matrix * DVector::from_column_slice(vector);
+            for (got, want) in out.iter().zip(expected.iter()) {
+                prop_assert!((got - want).abs() <= 1e-12 * (1.0 + want.abs()));
+            }
+        }
+
+        #[test]
+        fn bounded_is_finite_for_every_bit_pattern(bits: u64) {
+            let value = bounded(f64::from_bits(bits));
+            prop_assert!(value.is_finite() && !value.is_subnormal() && value.abs() <= LARGEST);
+        }
+    }
+}

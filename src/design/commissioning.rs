@@ -1,0 +1,247 @@
+//! The healthy database and the predictor made from it (41)-(43), (55)-(60).
+//!
+//! A database holds, for one mode, the inputs and outputs of a healthy plant under an exciting
+//! input. The predictor is the least-squares map from the last `j` inputs to the output,
+//! obtained by QR factorisation; `R` is kept, since it tells how far any later input lies from
+//! what the database has seen.
+
+use crate::control::parameters::Predictor;
+use crate::plant::{Mode, spectral_radius};
+use crate::simulate::noise;
+use nalgebra::{DMatrix, DVector};
+
+/// Healthy inputs and outputs of one mode: row `k` holds `u(k)` (m) and `y(k)` (p).
+#[derive(Clone, Debug, PartialEq)]
+pub struct Database {
+    /// Inputs relative to the operating point (samples x m).
+    pub inputs: DMatrix<f64>,
+    /// Outputs relative to the operating point (samples x p).
+    pub outputs: DMatrix<f64>,
+}
+
+/// The truncation error allowed when a response length is chosen, relative to the response itself.
+const TRUNCATION: f64 = 1e-7;
+
+/// The longest response this estimator accepts.
+pub const LONGEST_RESPONSE: usize = 2000;
+
+/// The smallest `j` with `|C A^j| <= 1e-7 |C|` in every mode.
+///
+/// # Errors
+/// Names the mode that is unstable or decays too slowly.
+pub fn response_length(modes: &[Mode]) -> Result<usize, String> {
+    let mut longest = 1;
+    for (index, mode) in modes.iter().enumerate() {
+        let radius = spectral_radius(&mode.a);
+        if radius >= 1.0 {
+            return Err(format!(
+                "mode {}: A has spectral radius {radius:.4}, but the estimator needs a stable mode (below 1): \
+                 stabilise the plant first or set estimator.method = \"none\"",
+                index + 1
+            ));
+        }
+        let target = TRUNCATION * mode.c.norm();
+        let mut response = mode.c.clone();
+        let mut length = 0;
+        while response.norm() > target {
+            response = &response * &mode.a;
+            length += 1;
+            if length > LONGEST_RESPONSE {
+                return Err(format!(
+                    "mode {}: the response is still felt after {LONGEST_RESPONSE} samples (spectral radius {radius:.6}): \
+                     choose a longer sample_time for this loop",
+                    index + 1
+                ));
+            }
+        }
+        longest = longest.max(length);
+    }
+    Ok(longest)
+}
+
+/// Samples a commissioning run needs after the first `j`: four per unknown and a hundred more.
+pub fn commissioning_samples(inputs: usize, response_length: usize) -> usize {
+    4 * inputs * response_length + 100
+}
+
+/// Runs the healthy plant model in one mode under a random binary input of the given amplitudes (m),
+/// with measurement noise of the given standard deviations (p).
+pub fn commission(
+    mode: &Mode,
+    amplitudes: &[f64],
+    deviation: &[f64],
+    samples: usize,
+    seed: u64,
+) -> Database {
+    let (m, p) = (mode.b.ncols(), mode.c.nrows());
+    let mut x = DVector::zeros(mode.a.nrows());
+    let mut inputs = DMatrix::zeros(samples, m);
+    let mut outputs = DMatrix::zeros(samples, p);
+    let mut draws = vec![0.0; m + p];
+    for k in 0..samples {
+        noise::standard_normal(seed, k as u64, &mut draws);
+        let (signs, errors) = draws.split_at(m);
+        let u = DVector::from_fn(m, |i, _| amplitudes[i].copysign(signs[i]));
+        let y = &mode.c * &x + DVector::from_fn(p, |i, _| deviation[i] * errors[i]);
+        inputs.row_mut(k).tr_copy_from(&u);
+        outputs.row_mut(k).tr_copy_from(&y);
+        x = &mode.a * x + &mode.b * u;
+    }
+    Database { inputs, outputs }
+}
+
+/// The predictor of a database by least squares.
+///
+/// A vanishing ridge keeps `R` regular when the database excites too little; such directions then
+/// have an enormous leverage and are never trusted.
+///
+/// # Errors
+/// The database has too few samples for `response_length`.
+pub fn predictor(database: &Database, response_length: usize) -> Result<Predictor, String> {
+    let (total, m) = database.inputs.shape();
+    let p = database.outputs.ncols();
+    let unknowns = m * response_length;
+    let samples = total.saturating_sub(response_length);
+    if samples <= unknowns {
+        return Err(format!(
+            "{total} samples are too few to identify {unknowns} response coefficients: record at least {}",
+            unknowns + response_length + 1
+        ));
+    }
+    let regressors = DMatrix::from_fn(samples, unknowns, |k, column| {
+        database.inputs[(k + column / m, column % m)]
+    });
+    let ridge = 1e-9 * regressors.norm() / (unknowns as f64).sqrt();
+    let mut stacked = regressors
+        .clone()
+        .resize_vertically(samples + unknowns, 0.0);
+    stacked
+        .view_mut((samples, 0), (unknowns, unknowns))
+        .fill_diagonal(ridge);
+    let targets = DMatrix::from_fn(samples, p, |k, output| {
+        database.outputs[(k + response_length, output)]
+    });
+    let qr = stacked.qr();
+    let mut rotated = targets.clone().resize_vertically(samples + unknowns, 0.0);
+    qr.q_tr_mul(&mut rotated);
+    let factor = qr.r();
+    let solution = factor
+        .solve_upper_triangular(&rotated.rows(0, unknowns).into_owned())
+        .ok_or("the database excites nothing: every recorded input is zero")?;
+    let error = targets - regressors * &solution;
+    let freedom = (samples - unknowns) as f64;
+    let deviation = error
+        .column_iter()
+        .map(|column| (column.norm_squared() / freedom).sqrt())
+        .collect();
+    Ok(Predictor {
+        response: solution.transpose(),
+        factor,
+        deviation,
+        samples,
+    })
+}
+
+/// The predictor from the model's own Markov parameters `[C A^(j-1) B ... C B]` (48), with the
+/// leverage a database of `samples` under the given amplitudes (m) would have.
+pub fn model_predictor(
+    mode: &Mode,
+    response_length: usize,
+    amplitudes: &[f64],
+    deviation: &[f64],
+) -> Predictor {
+    let (m, p) = (mode.b.ncols(), mode.c.nrows());
+    let unknowns = m * response_length;
+    let samples = commissioning_samples(m, response_length);
+    let mut response = DMatrix::zeros(p, unknowns);
+    let mut markov = mode.b.clone();
+    for lag in 0..response_length {
+        let first = (response_length - 1 - lag) * m;
+        response
+            .columns_mut(first, m)
+            .copy_from(&(&mode.c * &markov));
+        markov = &mode.a * markov;
+    }
+    let spread = (samples as f64).sqrt();
+    let factor = DMatrix::from_diagonal(&DVector::from_fn(unknowns, |i, _| {
+        spread * amplitudes[i % m]
+    }));
+    Predictor {
+        response,
+        factor,
+        deviation: deviation.to_vec(),
+        samples,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::plant::OperatingPoint;
+    use proptest::prelude::*;
+
+    fn stable_mode(entries: &[f64]) -> Mode {
+        let (n, m, p) = (3, 2, 2);
+        let mut at = entries.iter().copied();
+        let mut matrix = |r, c| DMatrix::from_fn(r, c, |_, _| at.next().unwrap_or(0.5));
+        let a = matrix(n, n);
+        let radius = spectral_radius(&a).max(0.1);
+        Mode {
+            name: "random".into(),
+            a: a * (0.6 / radius),
+            b: matrix(n, m),
+            c: matrix(p, n),
+            e: DMatrix::zeros(n, 0),
+            f: DMatrix::zeros(p, 0),
+            operating_point: OperatingPoint::zero(n, m, p),
+        }
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig::with_cases(32))]
+        #[test]
+        fn a_noiseless_database_reconstructs_the_markov_parameters(entries in prop::collection::vec(-1.0..1.0f64, 21)) {
+            let mode = stable_mode(&entries);
+            let length = response_length(std::slice::from_ref(&mode)).unwrap();
+            let samples = length + commissioning_samples(2, length);
+            let found = predictor(&commission(&mode, &[1.0, 2.0], &[0.0, 0.0], samples, 3), length).unwrap();
+            let exact = model_predictor(&mode, length, &[1.0, 2.0], &[0.0, 0.0]);
+            let scale = exact.response.norm().max(1e-3);
+            prop_assert!((found.response - exact.response).norm() <= 1e-5 * scale);
+        }
+    }
+
+    #[test]
+    fn the_residual_deviation_is_that_of_the_noise() {
+        let mode = stable_mode(&[0.3; 21]);
+        let samples = 4000;
+        let found = predictor(
+            &commission(&mode, &[1.0, 1.0], &[0.05, 0.2], samples, 9),
+            10,
+        )
+        .unwrap();
+        for (got, want) in found.deviation.iter().zip([0.05, 0.2]) {
+            assert!((got / want - 1.0).abs() < 0.1, "{got} for {want}");
+        }
+    }
+
+    #[test]
+    fn a_direction_never_excited_has_enormous_leverage() {
+        let mode = stable_mode(&[0.4; 21]);
+        let found = predictor(&commission(&mode, &[1.0, 0.0], &[0.0, 0.0], 200, 1), 5).unwrap();
+        let mut scratch = vec![0.0; 10];
+        let mut phi = vec![0.0; 10];
+        phi[0] = 1.0;
+        assert!(crate::control::estimator::leverage(&found.factor, &phi, &mut scratch) < 1.0);
+        phi[1] = 1.0;
+        assert!(crate::control::estimator::leverage(&found.factor, &phi, &mut scratch) > 1e6);
+    }
+
+    #[test]
+    fn an_unstable_mode_is_refused_by_number() {
+        let mut mode = stable_mode(&[0.3; 21]);
+        mode.a *= 2.0;
+        let message = response_length(&[stable_mode(&[0.3; 21]), mode]).unwrap_err();
+        assert!(message.starts_with("mode 2:"), "{message}");
+    }
+}

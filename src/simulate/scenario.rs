@@ -1,0 +1,265 @@
+//! What happens to the plant: mode schedule, references, sensor faults, disturbance, noise.
+
+use serde::{Deserialize, Serialize};
+
+/// A complete experiment; every signal is a pure function of the tick.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Scenario {
+    /// Number of samples.
+    pub steps: u64,
+    /// Standard deviation of the measurement noise per output (p).
+    pub noise: Vec<f64>,
+    /// Seed of the noise.
+    pub seed: u64,
+    /// Which mode is active from when on; the first entry starts at time 0.
+    pub schedule: Vec<ModeInterval>,
+    /// Reference per tracked output (r).
+    pub reference: Vec<Waveform>,
+    /// Additive fault per sensor (p).
+    pub fault: Vec<Waveform>,
+    /// Faults that are more than an addition.
+    pub events: Vec<FaultEvent>,
+    /// Disturbance per channel (s).
+    pub disturbance: Vec<Waveform>,
+}
+
+/// A mode (0-based) and the time in seconds from which it is active.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct ModeInterval {
+    /// Start in seconds.
+    pub from: f64,
+    /// Mode, 0-based.
+    pub mode: usize,
+}
+
+/// A signal over time in seconds.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(tag = "kind", rename_all = "lowercase")]
+pub enum Waveform {
+    /// The same value for ever.
+    Constant {
+        /// The value.
+        value: f64,
+    },
+    /// Each value holds from its time on; zero before the first.
+    Steps {
+        /// `[time, value]` pairs, times ascending.
+        points: Vec<[f64; 2]>,
+    },
+    /// `offset + amplitude` for half a period, `offset - amplitude` for the other.
+    Square {
+        /// Half the height.
+        amplitude: f64,
+        /// Seconds.
+        period: f64,
+        /// Added to all.
+        offset: f64,
+    },
+    /// `offset + amplitude sin(2 pi t / period + phase)`.
+    Sine {
+        /// Amplitude.
+        amplitude: f64,
+        /// Seconds.
+        period: f64,
+        /// Radians.
+        phase: f64,
+        /// Added to all.
+        offset: f64,
+    },
+    /// `value` until `from`, then moving by `slope` per second until `until`, then still.
+    Ramp {
+        /// Value before.
+        value: f64,
+        /// Change per second.
+        slope: f64,
+        /// Seconds.
+        from: f64,
+        /// Seconds.
+        until: f64,
+    },
+    /// One value per sample; the last one holds.
+    Table {
+        /// The values.
+        values: Vec<f64>,
+    },
+}
+
+/// A fault of one sensor during `[from, until)` seconds.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct FaultEvent {
+    /// Sensor, 0-based.
+    pub sensor: usize,
+    /// First instant in seconds.
+    pub from: f64,
+    /// End in seconds.
+    pub until: f64,
+    /// What happens to the reading.
+    pub kind: FaultKind,
+}
+
+/// What a faulty sensor reads instead of `y`.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(tag = "kind", rename_all = "kebab-case")]
+pub enum FaultKind {
+    /// `y + size`.
+    Bias {
+        /// Output units.
+        size: f64,
+    },
+    /// `y + slope (t - from)`.
+    Drift {
+        /// Output units per second.
+        slope: f64,
+    },
+    /// `(1 - loss) y`.
+    GainLoss {
+        /// Fraction lost.
+        loss: f64,
+    },
+    /// The last reading before the fault, for ever.
+    Stuck,
+    /// Bias during the first half of each period, healthy during the second.
+    Intermittent {
+        /// Output units.
+        size: f64,
+        /// Seconds.
+        period: f64,
+    },
+    /// Not a number.
+    Dropout,
+}
+
+/// The first tick at or after `time` seconds; a time that is a whole number of samples but for rounding counts as one.
+pub fn first_tick(time: f64, sample_time: f64) -> u64 {
+    libm::ceil(time / sample_time - 1e-9).max(0.0) as u64
+}
+
+impl Waveform {
+    /// Silence.
+    pub const ZERO: Self = Self::Constant { value: 0.0 };
+
+    /// The value at tick `tick` of a system sampled every `sample_time` seconds.
+    pub fn at(&self, tick: u64, sample_time: f64) -> f64 {
+        let time = tick as f64 * sample_time;
+        match self {
+            Self::Constant { value } => *value,
+            Self::Steps { points } => points
+                .iter()
+                .take_while(|[from, _]| first_tick(*from, sample_time) <= tick)
+                .last()
+                .map_or(0.0, |[_, value]| *value),
+            Self::Square {
+                amplitude,
+                period,
+                offset,
+            } => {
+                // A sample on an edge belongs to what follows it, whatever the rounding of `time`.
+                let turns = time / period + 1e-9;
+                let high = turns - libm::floor(turns) < 0.5;
+                offset + if high { *amplitude } else { -amplitude }
+            }
+            Self::Sine {
+                amplitude,
+                period,
+                phase,
+                offset,
+            } => {
+                let turns = libm::fmod(time, *period) / period;
+                offset + amplitude * libm::sin(core::f64::consts::TAU * turns + phase)
+            }
+            Self::Ramp {
+                value,
+                slope,
+                from,
+                until,
+            } => value + slope * (time.min(*until) - from).max(0.0),
+            Self::Table { values } => {
+                let last = values.len().saturating_sub(1) as u64;
+                values.get(tick.min(last) as usize).copied().unwrap_or(0.0)
+            }
+        }
+    }
+}
+
+impl Scenario {
+    /// The mode (0-based) active at `tick`.
+    pub fn mode(&self, tick: u64, sample_time: f64) -> usize {
+        self.schedule
+            .iter()
+            .take_while(|interval| first_tick(interval.from, sample_time) <= tick)
+            .last()
+            .map_or(0, |interval| interval.mode)
+    }
+}
+
+impl FaultEvent {
+    /// Whether the fault is present at `tick`.
+    pub fn active(&self, tick: u64, sample_time: f64) -> bool {
+        (first_tick(self.from, sample_time)..first_tick(self.until, sample_time)).contains(&tick)
+    }
+
+    /// The reading of a sensor whose healthy reading is `healthy` and whose last healthy one was `last`.
+    pub fn reading(&self, healthy: f64, last: f64, tick: u64, sample_time: f64) -> f64 {
+        let since = tick as f64 * sample_time - self.from;
+        match self.kind {
+            FaultKind::Bias { size } => healthy + size,
+            FaultKind::Drift { slope } => healthy + slope * since,
+            FaultKind::GainLoss { loss } => (1.0 - loss) * healthy,
+            FaultKind::Stuck => last,
+            FaultKind::Intermittent { size, period } => {
+                let turns = since / period + 1e-9;
+                healthy
+                    + if turns - libm::floor(turns) < 0.5 {
+                        size
+                    } else {
+                        0.0
+                    }
+            }
+            FaultKind::Dropout => f64::NAN,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn steps_hold_from_their_time_on() {
+        let signal = Waveform::Steps {
+            points: vec![[0.3, 1.0], [0.5, -1.0]],
+        };
+        let values: Vec<f64> = (0..7).map(|k| signal.at(k, 0.1)).collect();
+        assert_eq!(values, [0.0, 0.0, 0.0, 1.0, 1.0, -1.0, -1.0]);
+    }
+
+    #[test]
+    fn a_square_wave_changes_exactly_every_half_period() {
+        let signal = Waveform::Square {
+            amplitude: 1.0,
+            period: 0.4,
+            offset: 0.0,
+        };
+        for k in 0..100_000 {
+            let expected = if k % 4 < 2 { 1.0 } else { -1.0 };
+            assert_eq!(signal.at(k, 0.1), expected, "tick {k}");
+        }
+    }
+
+    #[test]
+    fn a_stuck_sensor_keeps_its_last_reading() {
+        let event = FaultEvent {
+            sensor: 0,
+            from: 2.0,
+            until: 4.0,
+            kind: FaultKind::Stuck,
+        };
+        assert!(
+            !event.active(1, 1.0)
+                && event.active(2, 1.0)
+                && event.active(3, 1.0)
+                && !event.active(4, 1.0)
+        );
+        assert_eq!(event.reading(5.0, 3.0, 3, 1.0), 3.0);
+    }
+}
