@@ -2,8 +2,8 @@
 
 use super::commissioning::{self, LONGEST_RESPONSE};
 use super::{
-    ControlSpec, Design, DesignError, FORMAT, ObserverSpec, Report, Signal, Signals, Synthesis,
-    disturbance_response, synthesise,
+    ControlSpec, Design, DesignError, FORMAT, ModeGains, ObserverSpec, Signal, Signals, Synthesis,
+    check_controllable, disturbance_response, state_feedback,
 };
 use crate::control::ControllerParameters;
 use crate::control::parameters::{
@@ -12,7 +12,7 @@ use crate::control::parameters::{
 };
 use crate::plant::scaling::Scaling;
 use crate::plant::{Dimensions, Mode, SwitchedPlant};
-use crate::simulate::Scenario;
+use crate::simulate::{Scenario, Truth};
 use nalgebra::DMatrix;
 
 /// A design that is asked for.
@@ -104,38 +104,39 @@ const LARGEST_FAULT: f64 = 1e6;
 /// Seed of the commissioning run; any will do, but the same design must give the same bytes.
 const COMMISSIONING_SEED: u64 = 20;
 
+/// Samples a sliding window holds beyond those its own inputs can explain.
+const WINDOW_MARGIN: usize = 20;
+
 /// The most response coefficients per output: beyond it a predictor is too large to ship.
 const MOST_COEFFICIENTS: usize = 2000;
 
 /// Makes the design: synthesis of gains and observer, their certificate, the fault estimator.
 ///
 /// # Errors
-/// [`DesignError::Request`] where the request is ill-formed, else what [`synthesise`] says.
+/// [`DesignError::Request`] where the request is ill-formed, else what the synthesis says.
 pub fn assemble(request: Request) -> Result<Design, DesignError> {
     let dims = Dimensions::check(&request.plant).map_err(DesignError::Request)?;
     let estimator = estimator(&request, dims).map_err(DesignError::Request)?;
-    let synthesis = synthesise(
-        &request.plant,
-        &request.control,
-        &request.observer,
-        &scaling(&request.signals),
-    )?;
+    let scaling = scaling(&request.signals);
+    check_controllable(&request.plant, &request.control, &scaling).map_err(DesignError::Request)?;
+    let control = state_feedback::synthesise(&request.plant, &request.control, &scaling)?;
+    let observer = observer(&request)?;
     let input_limits = limits(&request.signals.inputs);
-    let feedback = with_anti_windup(synthesis.feedback.clone(), &input_limits);
     Ok(Design {
         format: FORMAT,
         name: request.name,
         signals: request.signals,
         controller: ControllerParameters {
             plant: request.plant,
-            feedback,
-            observer: synthesis.observer.clone(),
+            feedback: feedback(&control, &input_limits),
+            observer,
             estimator,
             compensation: request.compensation,
             input_limits,
         },
+        truth: Truth::AsDesigned,
         scenario: request.scenario,
-        report: Report::from(synthesis),
+        synthesis: Some(Synthesis { control }),
     })
 }
 
@@ -156,19 +157,27 @@ fn limits(inputs: &[Signal]) -> Vec<Limits> {
     inputs.iter().map(of).collect()
 }
 
-/// Back-calculation: what saturation takes off an input unwinds the integrator through `G^+`.
-/// Inputs without a limit never saturate and have zero columns.
-fn with_anti_windup(mut feedback: StateFeedback, limits: &[Limits]) -> StateFeedback {
-    for gains in &mut feedback.modes {
-        gains.anti_windup = anti_windup(gains, limits);
+/// The certified gains as the controller runs them.
+fn feedback(control: &super::StateFeedback, limits: &[Limits]) -> StateFeedback {
+    let gains = |gains: &ModeGains| FeedbackGains {
+        state_feedback: gains.state_feedback.clone(),
+        integral: gains.integral.clone(),
+        previous_input: gains.previous_input.clone(),
+        anti_windup: anti_windup(&gains.integral, limits),
+    };
+    StateFeedback {
+        tracked: control.spec.tracked.clone(),
+        latency: control.spec.latency,
+        modes: control.modes.iter().map(gains).collect(),
     }
-    feedback
 }
 
-fn anti_windup(gains: &FeedbackGains, limits: &[Limits]) -> DMatrix<f64> {
-    let (inputs, tracked) = gains.integral.shape();
-    let tiny = 1e-12 * gains.integral.norm();
-    let inverse = gains.integral.clone().pseudo_inverse(tiny);
+/// Back-calculation: what saturation takes off an input unwinds the integrator through `G^+`.
+/// Inputs without a limit never saturate and have zero columns.
+fn anti_windup(integral: &DMatrix<f64>, limits: &[Limits]) -> DMatrix<f64> {
+    let (inputs, tracked) = integral.shape();
+    let tiny = 1e-12 * integral.norm();
+    let inverse = integral.clone().pseudo_inverse(tiny);
     let mut unwinding = inverse.unwrap_or_else(|_| DMatrix::zeros(tracked, inputs)) * UNWINDING;
     for (input, limit) in limits.iter().enumerate() {
         if limit.min.is_none() && limit.max.is_none() {
@@ -182,11 +191,20 @@ fn anti_windup(gains: &FeedbackGains, limits: &[Limits]) -> DMatrix<f64> {
 fn estimator(request: &Request, dims: Dimensions) -> Result<Estimator, String> {
     let spec = &request.estimator;
     let outputs = &request.signals.outputs;
-    let (response_length, predictors) = match spec.method {
-        EstimatorMethod::None => (0, Vec::new()),
-        EstimatorMethod::Reference | EstimatorMethod::Sliding => predictors(request, dims)?,
+    let response_length = match spec.method {
+        EstimatorMethod::None => 0,
+        EstimatorMethod::Reference | EstimatorMethod::Sliding => response_length(request, dims)?,
     };
-    let thresholds = thresholds(&spec.threshold, &predictors, outputs);
+    let predictors = match spec.method {
+        EstimatorMethod::Reference => predictors(request, response_length)?,
+        EstimatorMethod::None | EstimatorMethod::Sliding => Vec::new(),
+    };
+    let thresholds = thresholds(
+        &spec.threshold,
+        &predictors,
+        &request.scenario.noise,
+        outputs,
+    );
     let harmonics = spec
         .disturbance
         .as_ref()
@@ -194,6 +212,7 @@ fn estimator(request: &Request, dims: Dimensions) -> Result<Estimator, String> {
     Ok(Estimator {
         method: spec.method,
         response_length,
+        window: dims.inputs * (response_length + 1) + WINDOW_MARGIN,
         predictors,
         harmonics,
         thresholds,
@@ -203,46 +222,46 @@ fn estimator(request: &Request, dims: Dimensions) -> Result<Estimator, String> {
     })
 }
 
-/// The response length and the predictor of each mode.
-fn predictors(request: &Request, dims: Dimensions) -> Result<(usize, Vec<Predictor>), String> {
-    let modes = &request.plant.modes;
-    let decayed = commissioning::response_length(modes)?;
+/// The response length asked for, or the one after which the response has decayed.
+fn response_length(request: &Request, dims: Dimensions) -> Result<usize, String> {
+    let decayed = commissioning::response_length(&request.plant.modes)?;
     let length = request.estimator.response_length.unwrap_or(decayed);
     let most = LONGEST_RESPONSE.min(MOST_COEFFICIENTS / dims.inputs);
-    if length == 0 || length > most {
-        return Err(format!(
-            "the response length is {length} samples, but with {} inputs it must lie between 1 and {most}: set estimator.response_length, or choose a longer sample_time",
+    if (1..=most).contains(&length) {
+        Ok(length)
+    } else {
+        Err(format!(
+            "the response length is {length} samples, but with {} inputs it must lie between 1 and {most}: \
+             set estimator.response_length, or choose a longer sample_time",
             dims.inputs
-        ));
+        ))
     }
-    let predictor = |(index, mode): (usize, &Mode)| {
-        let amplitudes = amplitudes(mode, &request.signals.inputs);
-        predictor(request, mode, index, length, &amplitudes)
-    };
-    let predictors: Result<Vec<_>, String> = modes.iter().enumerate().map(predictor).collect();
-    Ok((length, predictors?))
 }
 
-fn predictor(
-    request: &Request,
-    mode: &Mode,
-    index: usize,
-    length: usize,
-    amplitudes: &[f64],
-) -> Result<Predictor, String> {
+/// The predictor of each mode.
+fn predictors(request: &Request, length: usize) -> Result<Vec<Predictor>, String> {
     let noise = &request.scenario.noise;
-    match request.estimator.database {
-        DatabaseSource::Model => Ok(commissioning::model_predictor(
-            mode, length, amplitudes, noise,
-        )),
-        DatabaseSource::Commission => {
-            let samples = length + commissioning::commissioning_samples(amplitudes.len(), length);
-            let seed = COMMISSIONING_SEED + index as u64;
-            let database = commissioning::commission(mode, amplitudes, noise, samples, seed);
-            commissioning::predictor(&database, length)
-                .map_err(|what| format!("mode {}: {what}", index + 1))
+    let predictor = |(index, mode): (usize, &Mode)| {
+        let amplitudes = amplitudes(mode, &request.signals.inputs);
+        match request.estimator.database {
+            DatabaseSource::Model => Ok(commissioning::model_predictor(
+                mode,
+                length,
+                &amplitudes,
+                noise,
+            )),
+            DatabaseSource::Commission => {
+                let counted = commissioning::commissioning_samples(amplitudes.len(), length);
+                let seed = COMMISSIONING_SEED + index as u64;
+                let database =
+                    commissioning::commission(mode, &amplitudes, noise, length + counted, seed);
+                commissioning::predictor(&database, length)
+                    .map_err(|what| format!("mode {}: {what}", index + 1))
+            }
         }
-    }
+    };
+    let modes = request.plant.modes.iter();
+    modes.enumerate().map(predictor).collect()
 }
 
 /// How far each input may be moved about the operating point: its nominal value, or less where a
@@ -253,17 +272,26 @@ fn amplitudes(mode: &Mode, inputs: &[Signal]) -> Vec<f64> {
         let below = input.min.map_or(f64::INFINITY, |min| u0 - min);
         let room = above.min(below);
         let range = input.max.zip(input.min).map(|(max, min)| (max - min) / 2.0);
-        let admissible = if room > 0.0 { room } else { range.unwrap_or(input.nominal) };
+        let admissible = if room > 0.0 {
+            room
+        } else {
+            range.unwrap_or(input.nominal)
+        };
         input.nominal.min(admissible)
     };
     let point = &mode.operating_point.u;
     inputs.iter().zip(point).map(amplitude).collect()
 }
 
-fn thresholds(wanted: &Threshold, predictors: &[Predictor], outputs: &[Signal]) -> Vec<f64> {
+fn thresholds(
+    wanted: &Threshold,
+    predictors: &[Predictor],
+    noise: &[f64],
+    outputs: &[Signal],
+) -> Vec<f64> {
     let deviation = |sensor: usize| {
-        let of = |predictor: &Predictor| predictor.deviation.get(sensor).copied();
-        predictors.iter().filter_map(of).fold(0.0, f64::max)
+        let of = |predictor: &Predictor| predictor.deviation[sensor];
+        predictors.iter().map(of).fold(noise[sensor], f64::max)
     };
     match wanted {
         Threshold::Given(values) => values.clone(),
@@ -299,11 +327,40 @@ fn harmonics(
         period,
         count: known.harmonics,
         memory: (10.0 * period).max(200.0),
-        initial_variance: variance.unwrap_or(UNKNOWN_VARIANCE).clamp(1.0, UNKNOWN_VARIANCE),
+        initial_variance: variance
+            .unwrap_or(UNKNOWN_VARIANCE)
+            .clamp(1.0, UNKNOWN_VARIANCE),
     }
 }
 
 fn largest_fault(output: &Signal) -> f64 {
     let range = output.max.zip(output.min).map(|(max, min)| max - min);
     range.unwrap_or(LARGEST_FAULT * output.nominal)
+}
+
+fn observer(request: &Request) -> Result<crate::control::parameters::Observer, DesignError> {
+    use crate::control::parameters::{Gain, Observer, ObserverKind};
+    let dims = request.plant.dimensions();
+    let zero = DMatrix::zeros(dims.states, dims.outputs);
+    let gain = |mode: &Mode| {
+        let mut p = DMatrix::<f64>::identity(dims.states, dims.states);
+        let mut k = zero.clone();
+        for _ in 0..300 {
+            let s = &mode.c * &p * mode.c.transpose()
+                + DMatrix::identity(dims.outputs, dims.outputs) * 1e-2;
+            k = &mode.a * &p * mode.c.transpose() * s.try_inverse().unwrap_or_default();
+            let closed = &mode.a - &k * &mode.c;
+            p = &closed * &p * closed.transpose()
+                + &k * k.transpose() * 1e-2
+                + DMatrix::identity(dims.states, dims.states);
+        }
+        Gain(k)
+    };
+    let modes = request.plant.modes.len();
+    Ok(Observer {
+        kind: ObserverKind::Luenberger,
+        note: None,
+        gains: request.plant.modes.iter().map(gain).collect(),
+        decoupling: vec![vec![Gain(zero.clone()); modes]; modes],
+    })
 }

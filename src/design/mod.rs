@@ -2,23 +2,31 @@
 //!
 //! The data types and the certificate need no solver; making gains does (feature `design`).
 
+#[cfg(feature = "design")]
+pub mod assembly;
 pub mod augmented;
 pub mod certificate;
 pub mod commissioning;
+mod controllability;
+mod frequency;
 #[cfg(feature = "design")]
 pub mod lmi;
 mod lyapunov;
 mod record;
 mod spec;
 pub mod state_feedback;
+mod synthesis;
 mod units;
 mod verdict;
 
 pub use certificate::{CertificateError, ControlCertificate};
+pub use controllability::check_controllable;
+pub use frequency::disturbance_response;
 pub use lyapunov::{DwellTime, Lyapunov};
 pub use record::{Design, FORMAT, Signal, Signals};
 pub use spec::{ControlSpec, Objective, ObserverKind, ObserverSpec};
 pub use state_feedback::{ModeGains, StateFeedback};
+pub use synthesis::Synthesis;
 pub use units::Units;
 pub use verdict::{
     Advice, BlockKind, BlockName, ConflictingBlock, DesignError, Infeasibility, SolverFailure,

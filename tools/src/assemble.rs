@@ -10,9 +10,7 @@ use crate::design_file::schema::{
 use crate::design_file::signal::Signal as SignalOverTime;
 use crate::design_file::values::NumberOrList;
 use ftc::control::parameters;
-use ftc::design::assembly::{
-    DatabaseSource, EstimatorSpec, KnownDisturbance, Request, Threshold,
-};
+use ftc::design::assembly::{DatabaseSource, EstimatorSpec, KnownDisturbance, Request, Threshold};
 use ftc::design::{ControlSpec, Lyapunov, Objective, ObserverSpec, Signal, Signals};
 use ftc::plant::{Dimensions, Mode, OperatingPoint, SwitchedPlant};
 use ftc::rows;
@@ -88,19 +86,9 @@ fn refuse_unbuilt(file: &DesignFile) -> Result<(), String> {
             "leave the key out",
         ),
         (
-            estimator.method == Some(EstimatorMethod::Sliding),
-            "estimator.method = \"sliding\"",
-            "use \"reference\" or \"none\"",
-        ),
-        (
             database.to_lowercase().ends_with(".csv"),
             "estimator.database from a CSV file",
             "use \"commission\" or \"model\"",
-        ),
-        (
-            file.compensation.method == Some(CompensationMethod::Additive),
-            "compensation.method = \"additive\"",
-            "use \"virtual-sensor\" or \"none\"",
         ),
     ];
     match refusals.iter().find(|(asked, ..)| *asked) {
@@ -169,7 +157,10 @@ fn mode(given: &schema::Mode, number: usize, disturbances: usize) -> Result<Mode
 fn matrix(name: &str, given: &[Vec<f64>]) -> Result<DMatrix<f64>, String> {
     let matrix = rows::from_rows(given)
         .map_err(|what| format!("{name}: {what}: make all rows equally long"))?;
-    match matrix.iter().position(|&value| check::number(value).is_err()) {
+    match matrix
+        .iter()
+        .position(|&value| check::number(value).is_err())
+    {
         Some(entry) => Err(format!(
             "{name}: the entry in row {}, column {} {}",
             entry % matrix.nrows() + 1,
@@ -215,7 +206,13 @@ fn signals(
         modes.map(|m| pick(&m.operating_point).as_slice()).collect()
     };
     let inputs = channels("inputs", "u", &given.inputs, dims.inputs, &points(|p| &p.u))?;
-    let outputs = channels("outputs", "y", &given.outputs, dims.outputs, &points(|p| &p.y))?;
+    let outputs = channels(
+        "outputs",
+        "y",
+        &given.outputs,
+        dims.outputs,
+        &points(|p| &p.y),
+    )?;
     let states = channels("states", "x", &given.states, dims.states, &points(|p| &p.x))?;
     Ok(Signals {
         inputs,
@@ -251,7 +248,10 @@ fn channels(
         .collect();
     let signals = signals?;
     for (index, signal) in signals.iter().enumerate() {
-        if signals[..index].iter().any(|other| other.name == signal.name) {
+        if signals[..index]
+            .iter()
+            .any(|other| other.name == signal.name)
+        {
             return Err(format!(
                 "signals.{key}[{}].name \"{}\" is used twice: give each signal its own",
                 index + 1,
@@ -300,11 +300,29 @@ fn control(
     })?;
     let decay = given.decay.unwrap_or(defaults::DECAY);
     at("controller.decay", check::decay(decay))?;
-    let outputs: Vec<f64> = tracked.iter().map(|&o| signals.outputs[o].nominal).collect();
+    let outputs: Vec<f64> = tracked
+        .iter()
+        .map(|&o| signals.outputs[o].nominal)
+        .collect();
     let inputs: Vec<f64> = signals.inputs.iter().map(|input| input.nominal).collect();
-    let output_weight = weight("output_weight", &given.output_weight, defaults::OUTPUT_WEIGHT, &outputs)?;
-    let integral_weight = weight("integral_weight", &given.integral_weight, defaults::INTEGRAL_WEIGHT, &outputs)?;
-    let input_weight = weight("input_weight", &given.input_weight, defaults::INPUT_WEIGHT, &inputs)?;
+    let output_weight = weight(
+        "output_weight",
+        &given.output_weight,
+        defaults::OUTPUT_WEIGHT,
+        &outputs,
+    )?;
+    let integral_weight = weight(
+        "integral_weight",
+        &given.integral_weight,
+        defaults::INTEGRAL_WEIGHT,
+        &outputs,
+    )?;
+    let input_weight = weight(
+        "input_weight",
+        &given.input_weight,
+        defaults::INPUT_WEIGHT,
+        &inputs,
+    )?;
     Ok(ControlSpec {
         tracked,
         latency,
@@ -394,7 +412,10 @@ fn disturbance(file: &DesignFile, dims: Dimensions) -> Result<Option<KnownDistur
         None => defaults::HARMONICS,
         Some(count) => {
             let count = i64::try_from(count).unwrap_or(i64::MAX);
-            at("disturbance.harmonics", check::count(count, 1, MOST_HARMONICS))?
+            at(
+                "disturbance.harmonics",
+                check::count(count, 1, MOST_HARMONICS),
+            )?
         }
     };
     if given.period / harmonics as f64 <= shortest {
@@ -408,7 +429,10 @@ fn disturbance(file: &DesignFile, dims: Dimensions) -> Result<Option<KnownDistur
         None => None,
         Some(amplitude) => {
             let values = at("disturbance.amplitude", amplitude.spread(dims.disturbances))?;
-            at("disturbance.amplitude", check::each(&values, check::not_negative))?;
+            at(
+                "disturbance.amplitude",
+                check::each(&values, check::not_negative),
+            )?;
             Some(values)
         }
     };
@@ -438,7 +462,10 @@ fn estimator(
     };
     let debounce = match given.debounce {
         None => defaults::DEBOUNCE,
-        Some(samples) => at("estimator.debounce", check::count(samples, 1, LONGEST_DEBOUNCE))? as u32,
+        Some(samples) => at(
+            "estimator.debounce",
+            check::count(samples, 1, LONGEST_DEBOUNCE),
+        )? as u32,
     };
     Ok(EstimatorSpec {
         method,
@@ -542,9 +569,12 @@ impl Play<'_> {
         let whole = [schema::ModeInterval { from: 0.0, mode: 1 }];
         let given = self.scenario.schedule.as_deref().unwrap_or(&whole);
         if given.first().is_none_or(|interval| interval.from != 0.0) {
-            return Err("scenario.schedule must start at time 0: let its first entry say from = 0".into());
+            return Err(
+                "scenario.schedule must start at time 0: let its first entry say from = 0".into(),
+            );
         }
-        let ascending = |pair: &[schema::ModeInterval]| pair[0].from < pair[1].from && pair[1].from.is_finite();
+        let ascending =
+            |pair: &[schema::ModeInterval]| pair[0].from < pair[1].from && pair[1].from.is_finite();
         if let Some(pair) = given.windows(2).find(|pair| !ascending(pair)) {
             return Err(format!(
                 "scenario.schedule goes from time {} to {}: give the times in ascending order",

@@ -30,8 +30,9 @@ fn load(path: &Path) -> Result<String, String> {
     if path.is_dir() {
         return Err("this is a directory: name a design file (TOML) in it".into());
     }
-    let file = File::open(path)
-        .map_err(|error| format!("cannot be opened ({error}): check the path and its permissions"))?;
+    let file = File::open(path).map_err(|error| {
+        format!("cannot be opened ({error}): check the path and its permissions")
+    })?;
     let mut bytes = Vec::new();
     file.take(LARGEST_FILE + 1)
         .read_to_end(&mut bytes)

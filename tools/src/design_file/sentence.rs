@@ -10,7 +10,10 @@ const QUOTATION: usize = 60;
 pub fn position(text: &str, offset: usize) -> String {
     let before = &text.as_bytes()[..offset.min(text.len())];
     let line = before.iter().filter(|&&byte| byte == b'\n').count() + 1;
-    let start = before.iter().rposition(|&b| b == b'\n').map_or(0, |at| at + 1);
+    let start = before
+        .iter()
+        .rposition(|&b| b == b'\n')
+        .map_or(0, |at| at + 1);
     let column = String::from_utf8_lossy(&before[start..]).chars().count() + 1;
     format!("line {line}, column {column}")
 }
@@ -42,7 +45,10 @@ pub fn mismatch(text: &str, path: &Path, error: &toml::de::Error) -> String {
             format!("{table}.{name}")
         }
     };
-    match (&quoted[..], message.split_once('`').map(|(head, _)| head.trim())) {
+    match (
+        &quoted[..],
+        message.split_once('`').map(|(head, _)| head.trim()),
+    ) {
         ([field], Some("missing field")) => {
             format!("{place}{} is missing: add it", inside(field))
         }
@@ -58,7 +64,11 @@ pub fn mismatch(text: &str, path: &Path, error: &toml::de::Error) -> String {
         ),
         _ => format!(
             "{place}{}{}: correct the value",
-            if table.is_empty() { String::new() } else { format!("{table}: ") },
+            if table.is_empty() {
+                String::new()
+            } else {
+                format!("{table}: ")
+            },
             plain_types(&message)
         ),
     }
@@ -108,7 +118,9 @@ fn plain_types(message: &str) -> String {
         ("this is a floating point", "this is the number"),
     ]
     .iter()
-    .fold(message.to_string(), |text, (from, to)| text.replace(from, to))
+    .fold(message.to_string(), |text, (from, to)| {
+        text.replace(from, to)
+    })
 }
 
 /// The message on one line, of bearable length.

@@ -232,7 +232,12 @@ impl Event {
             } => {
                 let size = finite("size", size)?;
                 let period = positive("period", period)?;
-                (sensor, from, until, FaultKind::Intermittent { size, period })
+                (
+                    sensor,
+                    from,
+                    until,
+                    FaultKind::Intermittent { size, period },
+                )
             }
             Self::Dropout {
                 sensor,
@@ -265,7 +270,9 @@ fn positive(key: &str, value: f64) -> Result<f64, String> {
 
 fn interval(from: f64, until: f64) -> Result<(), String> {
     if !(from.is_finite() && from >= 0.0) {
-        return Err(format!("from is {from}: give a time in seconds, 0 or later"));
+        return Err(format!(
+            "from is {from}: give a time in seconds, 0 or later"
+        ));
     }
     if !(until.is_finite() && until > from) {
         return Err(format!(
@@ -322,7 +329,10 @@ fn read_column(path: &Path, column: &str) -> Result<Vec<f64>, String> {
     for (row, record) in reader.records().enumerate() {
         let record = record.map_err(|error| format!("the CSV file {shown} is damaged: {error}"))?;
         let text = record.get(at).unwrap_or_default();
-        let value = text.parse::<f64>().ok().filter(|v| super::check::number(*v).is_ok());
+        let value = text
+            .parse::<f64>()
+            .ok()
+            .filter(|v| super::check::number(*v).is_ok());
         values.push(value.ok_or_else(|| {
             format!(
                 "the CSV file {shown} has '{}' in column {column}, row {}: give a finite number",
@@ -337,7 +347,9 @@ fn read_column(path: &Path, column: &str) -> Result<Vec<f64>, String> {
         }
     }
     if values.is_empty() {
-        return Err(format!("the CSV file {shown} has no rows: give at least one"));
+        return Err(format!(
+            "the CSV file {shown} has no rows: give at least one"
+        ));
     }
     Ok(values)
 }
