@@ -51,10 +51,6 @@ fn dwell_reaches_the_reference_values_per_mode() {
         let plant = paper(channel);
         let spec = paper_spec(latency, decay, Lyapunov::Dwell);
         let design = synthesise(&plant, &spec, &Scaling::automatic(&plant)).unwrap();
-        println!(
-            "{channel:?} {latency} {decay} {:?} {:?}",
-            design.gamma, design.dwell
-        );
         for (gamma, reference) in design.gamma.as_ref().unwrap().iter().zip(references) {
             assert_agrees(*gamma, reference);
         }
@@ -73,7 +69,6 @@ fn switched_equals_common_where_both_exist() {
         let plant = paper(channel);
         let spec = paper_spec(0, decay, Lyapunov::Switched);
         let design = synthesise(&plant, &spec, &Scaling::automatic(&plant)).unwrap();
-        println!("{:?} {:?}", design.gamma, design.optimum);
         assert!(
             design
                 .gamma
@@ -95,7 +90,6 @@ fn latency_makes_arbitrary_switching_infeasible_and_the_verdict_says_so() {
             let plant = paper(channel);
             let spec = paper_spec(1, decay, lyapunov);
             let error = synthesise(&plant, &spec, &Scaling::automatic(&plant)).unwrap_err();
-            println!("{error}");
             let DesignError::Infeasible(verdict) = error else {
                 panic!("{error:?}");
             };
@@ -231,7 +225,6 @@ fn random_plants_are_designed_certified_and_do_what_was_promised() {
             let design = match synthesise(&plant, &spec, &Scaling::automatic(&plant)) {
                 Ok(design) => design,
                 Err(DesignError::Infeasible(verdict)) => {
-                    println!("Te {sample_time} seed {seed}: {verdict}");
                     assert!(!verdict.blocks.is_empty());
                     continue;
                 }
@@ -244,12 +237,6 @@ fn random_plants_are_designed_certified_and_do_what_was_promised() {
                 let closed = closed_loop(&plant, &design, mode);
                 assert!(spectral_radius(&closed.0) < decay, "seed {seed}");
                 assert!(peak_gain(closed) <= gamma[mode], "seed {seed}");
-                println!(
-                    "Te {sample_time} seed {seed} {:?}: {} {}",
-                    dims,
-                    gamma[mode],
-                    gamma[mode] / optimum[mode] - 1.0
-                );
                 assert!(
                     gamma[mode] < 1.0001 * optimum[mode],
                     "seed {seed}: {} {}",
@@ -258,7 +245,6 @@ fn random_plants_are_designed_certified_and_do_what_was_promised() {
                 );
             }
         }
-        println!("{sample_time}: {designed}");
         assert!(designed >= 16, "{designed}");
     }
 }
