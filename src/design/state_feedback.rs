@@ -79,6 +79,8 @@ impl StateFeedback {
         parameters::StateFeedback {
             tracked: self.spec.tracked.clone(),
             latency: self.spec.latency,
+            resonators: Vec::new(),
+            bumpless: false,
             modes: modes.collect(),
         }
     }

@@ -146,14 +146,16 @@ pub fn controller(channel: Channel, noise: f64) -> ControllerParameters {
         feedback: StateFeedback {
             tracked: vec![0, 1],
             latency: 0,
+            resonators: vec![],
+            bumpless: false,
             modes: vec![
                 gains(
-                    dmatrix![0.198, -0.555; -0.852, -0.446],
-                    dmatrix![0.0, 0.257; 0.257, -0.001],
+                    dmatrix![0.199, -0.827; -1.125, -0.447],
+                    dmatrix![0.0, 0.528; 0.528, -0.001],
                 ),
                 gains(
-                    dmatrix![-0.654, 0.297; -0.109, -0.257],
-                    dmatrix![0.257, 0.001; 0.0, 0.257],
+                    dmatrix![-0.926, 0.298; -0.109, -0.529],
+                    dmatrix![0.528, 0.001; 0.0, 0.529],
                 ),
             ],
         },
