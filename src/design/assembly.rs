@@ -2,18 +2,16 @@
 
 use super::commissioning::{self, LONGEST_RESPONSE};
 use super::{
-    ControlSpec, Design, DesignError, FORMAT, ModeGains, ObserverSpec, Signal, Signals, Synthesis,
-    check_controllable, disturbance_response, state_feedback,
+    ControlSpec, Design, DesignError, FORMAT, ObserverSpec, Signal, Signals, check_controllable,
+    disturbance_response, synthesise,
 };
 use crate::control::ControllerParameters;
 use crate::control::parameters::{
-    Compensation, Estimator, EstimatorMethod, FeedbackGains, Harmonics, Limits, Predictor,
-    StateFeedback,
+    Compensation, Estimator, EstimatorMethod, Harmonics, Limits, Predictor, StateFeedback,
 };
 use crate::plant::scaling::Scaling;
 use crate::plant::{Dimensions, Mode, SwitchedPlant};
 use crate::simulate::{Scenario, Truth};
-use nalgebra::DMatrix;
 
 /// A design that is asked for.
 #[derive(Clone, Debug)]
@@ -26,6 +24,8 @@ pub struct Request {
     pub plant: SwitchedPlant,
     /// The state feedback that is asked for.
     pub control: ControlSpec,
+    /// Whether a mode switch leaves the command where it was.
+    pub bumpless: bool,
     /// The observer that is asked for.
     pub observer: ObserverSpec,
     /// The fault estimator that is asked for.
@@ -119,8 +119,12 @@ pub fn assemble(request: Request) -> Result<Design, DesignError> {
     let estimator = estimator(&request, dims).map_err(DesignError::Request)?;
     let scaling = scaling(&request.signals);
     check_controllable(&request.plant, &request.control, &scaling).map_err(DesignError::Request)?;
-    let control = state_feedback::synthesise(&request.plant, &request.control, &scaling)?;
-    let observer = observer(&request)?;
+    let synthesis = synthesise(
+        &request.plant,
+        &request.control,
+        &request.observer,
+        &scaling,
+    )?;
     let input_limits = limits(&request.signals.inputs);
     Ok(Design {
         format: FORMAT,
@@ -128,15 +132,15 @@ pub fn assemble(request: Request) -> Result<Design, DesignError> {
         signals: request.signals,
         controller: ControllerParameters {
             plant: request.plant,
-            feedback: feedback(&control, &input_limits),
-            observer,
+            feedback: feedback(&synthesis.state_feedback, request.bumpless, &input_limits),
+            observer: synthesis.observer.observer.clone(),
             estimator,
             compensation: request.compensation,
             input_limits,
         },
         truth: Truth::AsDesigned,
         scenario: request.scenario,
-        synthesis: Some(Synthesis { control }),
+        synthesis: Some(synthesis),
     })
 }
 
@@ -157,34 +161,18 @@ fn limits(inputs: &[Signal]) -> Vec<Limits> {
     inputs.iter().map(of).collect()
 }
 
-/// The certified gains as the controller runs them.
-fn feedback(control: &super::StateFeedback, limits: &[Limits]) -> StateFeedback {
-    let gains = |gains: &ModeGains| FeedbackGains {
-        state_feedback: gains.state_feedback.clone(),
-        integral: gains.integral.clone(),
-        previous_input: gains.previous_input.clone(),
-        anti_windup: anti_windup(&gains.integral, limits),
-    };
-    StateFeedback {
-        tracked: control.spec.tracked.clone(),
-        latency: control.spec.latency,
-        modes: control.modes.iter().map(gains).collect(),
-    }
-}
-
-/// Back-calculation: what saturation takes off an input unwinds the integrator through `G^+`.
-/// Inputs without a limit never saturate and have zero columns.
-fn anti_windup(integral: &DMatrix<f64>, limits: &[Limits]) -> DMatrix<f64> {
-    let (inputs, tracked) = integral.shape();
-    let tiny = 1e-12 * integral.norm();
-    let inverse = integral.clone().pseudo_inverse(tiny);
-    let mut unwinding = inverse.unwrap_or_else(|_| DMatrix::zeros(tracked, inputs)) * UNWINDING;
-    for (input, limit) in limits.iter().enumerate() {
-        if limit.min.is_none() && limit.max.is_none() {
-            unwinding.column_mut(input).fill(0.0);
+/// The certified gains as the controller runs them. What saturation takes off an input unwinds
+/// the integral by half of what would undo it; inputs without a limit never saturate.
+fn feedback(control: &super::StateFeedback, bumpless: bool, limits: &[Limits]) -> StateFeedback {
+    let mut feedback = control.for_controller();
+    feedback.bumpless = bumpless;
+    for gains in &mut feedback.modes {
+        for (mut column, limit) in gains.anti_windup.column_iter_mut().zip(limits) {
+            let limited = limit.min.is_some() || limit.max.is_some();
+            column *= if limited { UNWINDING } else { 0.0 };
         }
     }
-    unwinding
+    feedback
 }
 
 /// Predictors, thresholds and harmonics.
@@ -336,31 +324,4 @@ fn harmonics(
 fn largest_fault(output: &Signal) -> f64 {
     let range = output.max.zip(output.min).map(|(max, min)| max - min);
     range.unwrap_or(LARGEST_FAULT * output.nominal)
-}
-
-fn observer(request: &Request) -> Result<crate::control::parameters::Observer, DesignError> {
-    use crate::control::parameters::{Gain, Observer, ObserverKind};
-    let dims = request.plant.dimensions();
-    let zero = DMatrix::zeros(dims.states, dims.outputs);
-    let gain = |mode: &Mode| {
-        let mut p = DMatrix::<f64>::identity(dims.states, dims.states);
-        let mut k = zero.clone();
-        for _ in 0..300 {
-            let s = &mode.c * &p * mode.c.transpose()
-                + DMatrix::identity(dims.outputs, dims.outputs) * 1e-2;
-            k = &mode.a * &p * mode.c.transpose() * s.try_inverse().unwrap_or_default();
-            let closed = &mode.a - &k * &mode.c;
-            p = &closed * &p * closed.transpose()
-                + &k * k.transpose() * 1e-2
-                + DMatrix::identity(dims.states, dims.states);
-        }
-        Gain(k)
-    };
-    let modes = request.plant.modes.len();
-    Ok(Observer {
-        kind: ObserverKind::Luenberger,
-        note: None,
-        gains: request.plant.modes.iter().map(gain).collect(),
-        decoupling: vec![vec![Gain(zero.clone()); modes]; modes],
-    })
 }

@@ -58,6 +58,7 @@ pub fn request(file: &DesignFile, folder: &Path) -> Result<Request, String> {
         signals,
         plant,
         control,
+        bumpless: file.controller.bumpless.unwrap_or(defaults::BUMPLESS),
         observer,
         estimator,
         compensation: compensation(file),
@@ -75,11 +76,6 @@ fn refuse_unbuilt(file: &DesignFile) -> Result<(), String> {
     let estimator = &file.estimator;
     let database = estimator.database.as_deref().unwrap_or(defaults::DATABASE);
     let refusals = [
-        (
-            file.controller.bumpless == Some(true),
-            "controller.bumpless = true",
-            "leave the key out",
-        ),
         (
             file.controller.internal_model == Some(true),
             "controller.internal_model = true",
@@ -388,7 +384,7 @@ fn weight(
 }
 
 fn observer(given: &schema::Observer, control: &ControlSpec) -> Result<ObserverSpec, String> {
-    use ftc::design::ObserverKind as Kind;
+    use ftc::design::ObserverChoice as Kind;
     let decay = given.decay.unwrap_or(control.decay);
     at("observer.decay", check::decay(decay))?;
     Ok(ObserverSpec {

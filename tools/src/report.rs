@@ -1,7 +1,7 @@
 //! The design report, for a person and for a program.
 
 use ftc::control::parameters::{EstimatorMethod, ObserverKind};
-use ftc::design::{ControlSpec, Design, DesignError, Signal, StateFeedback};
+use ftc::design::{ControlSpec, Design, DesignError, ObserverDesign, Signal, StateFeedback};
 use serde_json::{Value, json};
 use std::fmt::Write;
 
@@ -25,12 +25,15 @@ pub type Section = (&'static str, Vec<(String, String)>);
 pub fn sections(design: &Design) -> Vec<Section> {
     let mut sections = vec![("Design", overview(design))];
     if let Some(synthesis) = &design.synthesis {
-        sections.push(("State feedback", feedback(design, &synthesis.control)));
+        sections.push((
+            "State feedback",
+            feedback(design, &synthesis.state_feedback),
+        ));
     }
     sections.push(("Observer", observer(design)));
     sections.push(("Fault estimator", estimator(design)));
     if let Some(synthesis) = &design.synthesis {
-        sections.push(("Certificate", certificate(&synthesis.control)));
+        sections.push(("Certificate", certificate(&synthesis.state_feedback)));
     }
     sections
 }
@@ -87,7 +90,10 @@ fn observer(design: &Design) -> Vec<(String, String)> {
         ObserverKind::Luenberger => "Luenberger observer",
     };
     let mut lines = vec![line("kind", kind)];
-    lines.extend(observer.note.iter().map(|note| line("note", note)));
+    lines.extend(observer.note.iter().map(|note| line("because", note)));
+    if let Some(synthesis) = &design.synthesis {
+        lines.extend(observer_decay(&synthesis.observer));
+    }
     lines
 }
 
@@ -134,6 +140,21 @@ fn estimator(design: &Design) -> Vec<(String, String)> {
     lines
 }
 
+fn observer_decay(observer: &ObserverDesign) -> Vec<(String, String)> {
+    let radius = |(index, radius): (usize, &f64)| {
+        line(
+            format!("mode {}", index + 1),
+            format!("spectral radius of the error {radius:.4}"),
+        )
+    };
+    let mut lines = vec![line(
+        "decay asked",
+        format!("{} per sample", observer.spec.decay),
+    )];
+    lines.extend(observer.spectral_radius.iter().enumerate().map(radius));
+    lines
+}
+
 fn certificate(control: &StateFeedback) -> Vec<(String, String)> {
     let guarantee = match &control.dwell {
         None => "stable under arbitrary switching".to_string(),
@@ -167,7 +188,7 @@ pub fn json(design: &Design) -> String {
     let control = design
         .synthesis
         .as_ref()
-        .map(|synthesis| &synthesis.control);
+        .map(|synthesis| &synthesis.state_feedback);
     let deviations: Vec<&Vec<f64>> = estimator.predictors.iter().map(|p| &p.deviation).collect();
     let samples: Vec<usize> = estimator.predictors.iter().map(|p| p.samples).collect();
     let value = json!({
@@ -184,6 +205,8 @@ pub fn json(design: &Design) -> String {
         "observer": {
             "kind": design.controller.observer.kind,
             "note": design.controller.observer.note,
+            "decay": design.synthesis.as_ref().map(|s| s.observer.spec.decay),
+            "spectral_radius": design.synthesis.as_ref().map(|s| s.observer.spectral_radius.clone()),
         },
         "estimator": {
             "method": estimator.method,
