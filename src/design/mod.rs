@@ -5,6 +5,7 @@
 pub mod augmented;
 pub mod certificate;
 pub mod commissioning;
+pub mod harmonics;
 #[cfg(feature = "design")]
 pub mod lmi;
 mod lyapunov;

@@ -180,6 +180,11 @@ pub fn controller(channel: Channel, noise: f64) -> ControllerParameters {
                 memory: 3000.0,
                 initial_variance: 1e6,
             }),
+            harmonic_transfers: ftc::design::harmonics::transfers(
+                &plant,
+                core::f64::consts::TAU / 0.02,
+                1,
+            ),
             thresholds,
             debounce: 1,
             leverage_limit: 100.0,

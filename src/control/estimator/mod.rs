@@ -21,6 +21,9 @@ use super::kernel;
 use super::parameters::{Estimator, EstimatorMethod};
 use serde::{Deserialize, Serialize};
 
+/// How many noise deviations a threshold usually is.
+const USUAL_SIGMAS: f64 = 6.0;
+
 /// One sample as the estimator sees it.
 #[derive(Clone, Copy, Debug)]
 pub struct Observation<'a> {
@@ -90,11 +93,32 @@ impl EstimatorState {
         }
     }
 
-    /// Called on entering a mode: the regressor mixes modes for `response_length` samples.
-    pub fn mode_entered(&mut self, estimator: &Estimator) {
+    /// Called on leaving mode `from` for mode `to`: the regressor mixes modes for `response_length`
+    /// samples, and a mode never learned in starts from what the other taught.
+    pub fn mode_entered(
+        &mut self,
+        estimator: &Estimator,
+        from: usize,
+        to: usize,
+        thresholds: &[f64],
+    ) {
         self.hold = estimator.response_length;
         if let Some(window) = &mut self.window {
             window.clear();
+        }
+        let maps = estimator
+            .harmonic_transfers
+            .get(from)
+            .and_then(|row| row.get(to));
+        if let Some(maps) = maps
+            && let Ok([left, entered]) = self.harmonics.get_disjoint_mut([from, to])
+            && left.is_known()
+            && !entered.is_known()
+        {
+            let deviations = thresholds
+                .iter()
+                .map(|t| (t / USUAL_SIGMAS).max(f64::MIN_POSITIVE));
+            entered.carry_over(left, maps, deviations);
         }
     }
 
@@ -147,7 +171,9 @@ impl EstimatorState {
                 *residual = value - predicted;
             }
         }
-        let trusted = self.hold == 0 && leverage <= estimator.leverage_limit;
+        // What was not learned cannot clear a fault that is declared.
+        let uncertain = spread > 1.0 + estimator.leverage_limit && self.flagged.contains(&true);
+        let trusted = self.hold == 0 && leverage <= estimator.leverage_limit && !uncertain;
         trusted.then(|| libm::sqrt(spread))
     }
 
