@@ -267,7 +267,7 @@ pub(crate) fn verify_observer(
     Ok(())
 }
 
-/// The least factor `mu >= 1` (a hair above its computed value, so that it can be proved) by which
+/// The least factor `mu >= 1` by which
 /// an observer's Lyapunov function exceeds `decay^2` over a switch.
 #[cfg(feature = "design")]
 pub(crate) fn observer_growth(plant: &SwitchedPlant, design: &ObserverDesign) -> Option<f64> {
@@ -282,7 +282,35 @@ pub(crate) fn observer_growth(plant: &SwitchedPlant, design: &ObserverDesign) ->
         let growth = largest_ratio(&after, &matrices[i].0)?;
         mu = mu.max(growth / design.spec.decay.powi(2));
     }
-    Some(mu * (1.0 + 1e-9))
+    Some(mu)
+}
+
+/// The dwell time that the factor between Lyapunov matrices `S` asks for, with the smallest `mu`
+/// that can be proved.
+#[cfg(feature = "design")]
+pub(crate) fn provable_dwell(
+    matrices: &[DMatrix<f64>],
+    decay: f64,
+    sample_time: f64,
+) -> Result<DwellTime, CertificateError> {
+    let mut mu = 1.0_f64;
+    for (i, j) in all_pairs(matrices.len()) {
+        let ratio = largest_ratio(&matrices[i], &matrices[j])
+            .ok_or_else(|| CertificateError::Unproved(BlockName::new(BlockKind::Lyapunov, j, j)))?;
+        mu = mu.max(ratio);
+    }
+    let enclosed: Vec<Enclosure> = matrices.iter().cloned().map(Enclosure::exact).collect();
+    let mut outcome = Err(CertificateError::Malformed(
+        "no dwell time was tried".into(),
+    ));
+    for allowance in DwellTime::ALLOWANCES {
+        let dwell = DwellTime::new(mu * (1.0 + allowance), decay, sample_time);
+        outcome = prove_dwell(&enclosed, &dwell, decay, sample_time).map(|()| dwell);
+        if outcome.is_ok() {
+            break;
+        }
+    }
+    outcome
 }
 
 /// The largest eigenvalue of `below^-1 above` for symmetric matrices, `below` positive definite.

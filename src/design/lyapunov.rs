@@ -98,6 +98,10 @@ pub struct DwellTime {
 }
 
 impl DwellTime {
+    /// Relative amounts by which a computed `mu` is raised, in turn, until it can be proved.
+    #[cfg(feature = "design")]
+    pub(crate) const ALLOWANCES: [f64; 4] = [1e-9, 1e-6, 1e-3, 1.0];
+
     /// From the proved factor `mu >= 1` and decay rate `0 < decay < 1`.
     pub fn new(mu: f64, decay: f64, sample_time: f64) -> Self {
         let samples = (mu.ln() / (-2.0 * decay.ln())).max(0.0);

@@ -5,7 +5,11 @@
 #[cfg(feature = "design")]
 mod advice;
 #[cfg(feature = "design")]
+mod frame;
+#[cfg(feature = "design")]
 mod synthesis;
+#[cfg(feature = "design")]
+mod theorem;
 
 #[cfg(feature = "design")]
 pub use synthesis::synthesise;

@@ -129,3 +129,38 @@ pub fn random_plant(seed: u64, sample_time: f64) -> SwitchedPlant {
         .collect();
     SwitchedPlant { sample_time, modes }
 }
+
+/// A three-phase rectifier in amperes and volts, states (i_d, i_q, v_dc), sampled at 0.1 ms: 10 mH,
+/// 0.3 ohm, 2 mF, 50 Hz, 311 V phase amplitude, 600 V on the DC side, one mode per load.
+/// Linearised averaged model; inputs are the converter's modulation indices.
+pub fn rectifier() -> SwitchedPlant {
+    let (l, r, c, omega) = (10e-3, 0.3, 2e-3, 314.159);
+    let (source, link, sample_time) = (311.0_f64, 600.0_f64, 1e-4);
+    let modes = [80.0_f64, 40.0]
+        .into_iter()
+        .map(|load| {
+            // Steady state with i_q = 0: 1.5 (source i_d - r i_d^2) = link^2 / load.
+            let power = link * link / load;
+            let current = (source - (source * source - 4.0 * r * power / 1.5).sqrt()) / (2.0 * r);
+            let (m_d, m_q) = ((source - r * current) / link, -omega * l * current / link);
+            let continuous = rows([
+                [-r / l, omega, -m_d / l],
+                [-omega, -r / l, -m_q / l],
+                [1.5 * m_d / c, 1.5 * m_q / c, -1.0 / (load * c)],
+            ]);
+            let input = rows([[-link / l, 0.0], [0.0, -link / l], [1.5 * current / c, 0.0]]);
+            let disturbance = rows([[0.0], [0.0], [-1.0 / c]]);
+            let exponential = (sample_time * &continuous).exp();
+            // Zero-order hold by the midpoint of the transition, accurate to O(Te^3).
+            let hold = sample_time * (0.5 * sample_time * &continuous).exp();
+            mode(
+                exponential,
+                &hold * input,
+                rows([[0.0, 0.0, 1.0], [0.0, 1.0, 0.0]]),
+                &hold * disturbance,
+                rows([[0.0], [0.0]]),
+            )
+        })
+        .collect();
+    SwitchedPlant { sample_time, modes }
+}

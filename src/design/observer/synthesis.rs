@@ -274,12 +274,21 @@ fn design(
             lyapunov: matrices.into_iter().map(LyapunovMatrix).collect(),
         },
     };
-    if spec.lyapunov == Lyapunov::Dwell {
-        let mu = observer_growth(plant, &found).ok_or(SolverFailure::NumericalTrouble)?;
-        found.dwell = Some(DwellTime::new(mu, spec.decay, plant.sample_time));
+    if spec.lyapunov != Lyapunov::Dwell {
+        found.verify(plant)?;
+        return Ok(found);
     }
-    found.verify(plant)?;
-    Ok(found)
+    let mu = observer_growth(plant, &found).ok_or(SolverFailure::NumericalTrouble)?;
+    let mut outcome = Err(SolverFailure::NumericalTrouble.into());
+    for allowance in DwellTime::ALLOWANCES {
+        let dwell = DwellTime::new(mu * (1.0 + allowance), spec.decay, plant.sample_time);
+        found.dwell = Some(dwell);
+        outcome = found.verify(plant).map_err(DesignError::from);
+        if outcome.is_ok() {
+            break;
+        }
+    }
+    outcome.map(|()| found)
 }
 
 /// Changes that were tried and make the observer feasible.

@@ -46,10 +46,8 @@ fn fewer_outputs(
         return None;
     }
     (0..spec.tracked.len()).rev().find_map(|left_out| {
-        let mut fewer = spec.clone();
-        fewer.tracked.remove(left_out);
-        fewer.output_weight.remove(left_out);
-        fewer.integral_weight.remove(left_out);
-        feasible(&fewer).then_some(fewer.tracked)
+        let mut fewer = spec.tracked.clone();
+        fewer.remove(left_out);
+        feasible(&Advice::Tracked(fewer.clone()).apply(spec)).then_some(fewer)
     })
 }
