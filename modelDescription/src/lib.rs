@@ -11,9 +11,10 @@
 //!                                                                   └─> the C interface (fmu-abi)
 //! ```
 //!
-//! The crate knows neither control nor C: it depends on nothing but a hash function.
+//! The crate knows no C, and of a design only its sizes and names.
 
 mod check;
+mod design;
 mod guid;
 mod interface;
 mod table;
