@@ -1,0 +1,60 @@
+"""Reading a finished design: the JSON record that the command line ships inside each FMU."""
+
+from __future__ import annotations
+
+import json
+import zipfile
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+RESOURCE = "resources/design.json"
+
+
+def load(path: Path) -> dict:
+    """Returns the record in a `.json` file, or the one zipped into an FMU."""
+    if path.suffix == ".fmu":
+        with zipfile.ZipFile(path) as archive:
+            return json.loads(archive.read(RESOURCE))
+    return json.loads(path.read_text())
+
+
+@dataclass(frozen=True)
+class Mode:
+    """One mode as an affine system: x+ = A x + B u + E w + a, y = C x + F w + c."""
+
+    A: np.ndarray
+    B: np.ndarray
+    C: np.ndarray
+    E: np.ndarray
+    F: np.ndarray
+    x0: np.ndarray
+    u0: np.ndarray
+    y0: np.ndarray
+
+    @property
+    def a(self) -> np.ndarray:
+        """Affine term of the state equation, which makes (x0, u0) a rest point."""
+        return self.x0 - self.A @ self.x0 - self.B @ self.u0
+
+    @property
+    def c(self) -> np.ndarray:
+        """Affine term of the output equation, which makes x0 read as y0."""
+        return self.y0 - self.C @ self.x0
+
+
+def modes(design: dict) -> list[Mode]:
+    """Returns the plant's modes."""
+    return [
+        Mode(
+            **{key.upper(): np.array(mode[key], dtype=float) for key in "abcef"},
+            **{key + "0": np.array(mode["operating_point"][key], dtype=float) for key in "xuy"},
+        )
+        for mode in design["controller"]["plant"]["modes"]
+    ]
+
+
+def sample_time(design: dict) -> float:
+    """Returns Te in seconds."""
+    return design["controller"]["plant"]["sample_time"]
