@@ -1,11 +1,12 @@
 //! The controller: estimator, compensation, observer, state feedback and integrator, composed.
 
-use super::compensation;
-use super::estimator::EstimatorState;
+use super::compensation::{self, AdditiveControl};
+use super::estimator::{EstimatorState, Observation};
 use super::integrator;
 use super::kernel;
 use super::observer::{ObservedMode, ObserverState};
 use super::parameters::{Compensation, ControllerParameters, Limits};
+use nalgebra::DMatrix;
 use serde::{Deserialize, Serialize};
 
 /// A controller ready to run: immutable, shared by any number of [`ControllerState`]s.
@@ -13,6 +14,8 @@ use serde::{Deserialize, Serialize};
 pub struct Controller {
     parameters: ControllerParameters,
     modes: Vec<ObservedMode>,
+    /// `K_i C_i^+` per mode (m x p), for the printed additive control.
+    static_gains: Vec<DMatrix<f64>>,
 }
 
 /// What a tick is told.
@@ -54,6 +57,8 @@ pub struct ControllerState {
     pub estimator: EstimatorState,
     /// Integrator state `Z` (r).
     pub integral: Vec<f64>,
+    /// The printed additive control, where it is chosen.
+    additive: Option<AdditiveControl>,
     /// Command `u` (m).
     pub command: Vec<f64>,
     /// Corrected measurement `y_c` (p).
@@ -85,7 +90,18 @@ impl Controller {
                 output_offset: mode.output_offset().iter().copied().collect(),
             })
             .collect();
-        Self { parameters, modes }
+        let static_gains = parameters
+            .plant
+            .modes
+            .iter()
+            .zip(&parameters.feedback.modes)
+            .map(|(mode, gains)| &gains.state_feedback * pseudo_inverse(&mode.c))
+            .collect();
+        Self {
+            parameters,
+            modes,
+            static_gains,
+        }
     }
 
     /// What this controller was built from.
@@ -96,12 +112,15 @@ impl Controller {
     /// The state before the first tick in `mode` (0-based): at rest at its operating point.
     pub fn initial_state(&self, mode: usize) -> ControllerState {
         let dims = self.parameters.plant.dimensions();
+        let tracked = self.parameters.feedback.tracked.len();
         let point = &self.parameters.plant.modes[mode].operating_point;
         ControllerState {
             mode: None,
             observer: ObserverState::new(&point.x, dims.outputs),
             estimator: EstimatorState::new(&self.parameters.estimator, &point.u, dims.outputs),
-            integral: vec![0.0; self.parameters.feedback.tracked.len()],
+            integral: vec![0.0; tracked],
+            additive: (self.parameters.compensation == Compensation::Additive)
+                .then(|| AdditiveControl::new(tracked, dims.inputs)),
             command: point.u.clone(),
             corrected: point.y.clone(),
             acting: point.u.clone(),
@@ -124,12 +143,14 @@ impl Controller {
         let left = self.enter(state, mode);
         state.estimator.observe(
             &self.parameters.estimator,
-            sample.tick,
-            mode,
-            &point.u,
-            &point.y,
-            sample.measurement,
-            sample.thresholds,
+            &Observation {
+                tick: sample.tick,
+                mode,
+                u0: &point.u,
+                y0: &point.y,
+                y: sample.measurement,
+                thresholds: sample.thresholds,
+            },
         );
         self.correct_measurement(state, model, sample);
         state.observer.correct(
@@ -139,7 +160,7 @@ impl Controller {
             mode,
             &state.corrected,
         );
-        self.command(state, mode, &point.x, &point.u);
+        self.command(state, mode, &point.x, &point.u, sample.compensate);
         self.advance(state, model, mode, sample);
     }
 
@@ -166,7 +187,7 @@ impl Controller {
         }
         let fault = match sample.compensate {
             Compensate::Known(fault) => fault,
-            Compensate::Estimate if self.parameters.compensation != Compensation::None => {
+            Compensate::Estimate if self.parameters.compensation == Compensation::VirtualSensor => {
                 &state.estimator.fault
             }
             Compensate::Estimate | Compensate::Nothing => &state.no_fault,
@@ -181,7 +202,14 @@ impl Controller {
     }
 
     /// `u = u0 + K (x_hat - x0) + G Z + V (u_prev - u0)`, clamped to the input's limits.
-    fn command(&self, state: &mut ControllerState, mode: usize, x0: &[f64], u0: &[f64]) {
+    fn command(
+        &self,
+        state: &mut ControllerState,
+        mode: usize,
+        x0: &[f64],
+        u0: &[f64],
+        compensate: Compensate<'_>,
+    ) {
         let Some(gains) = self.parameters.feedback.modes.get(mode) else {
             return;
         };
@@ -194,6 +222,18 @@ impl Controller {
         kernel::add_product(&mut state.command, &gains.integral, &state.integral);
         kernel::difference(&mut state.deviation, &state.acting, u0);
         kernel::add_product(&mut state.command, &gains.previous_input, &state.deviation);
+        if let Some(additive) = &mut state.additive
+            && compensate == Compensate::Estimate
+            && let Some(gain) = self.static_gains.get(mode)
+        {
+            let fault = &state.estimator.fault;
+            additive.add_to(&mut state.command, gain, &gains.integral, fault);
+            additive.advance(
+                self.parameters.plant.sample_time,
+                &self.parameters.feedback.tracked,
+                fault,
+            );
+        }
         saturate(
             &mut state.command,
             &mut state.excess,
@@ -240,4 +280,12 @@ fn saturate(command: &mut [f64], excess: &mut [f64], limits: &[Limits]) {
         *value = limit.clamp(wanted);
         *taken = *value - wanted;
     }
+}
+
+/// The Moore-Penrose inverse.
+fn pseudo_inverse(matrix: &DMatrix<f64>) -> DMatrix<f64> {
+    let svd = matrix.clone().svd(true, true);
+    let tolerance = 1e-12 * svd.singular_values.max();
+    svd.pseudo_inverse(tolerance)
+        .unwrap_or_else(|_| matrix.transpose() * 0.0)
 }

@@ -55,13 +55,6 @@ impl ObserverState {
         }
     }
 
-    /// Moves the observer to state `x0` with nothing pending.
-    pub fn restart(&mut self, x0: &[f64]) {
-        kernel::copy(&mut self.prior, x0);
-        kernel::copy(&mut self.estimate, x0);
-        self.injection.fill(0.0);
-    }
-
     /// The output this observer expects now (p), before any measurement.
     pub fn expected_output(&self, mode: &ObservedMode, out: &mut [f64]) {
         kernel::affine(out, &mode.output_offset, &mode.c, &self.prior);

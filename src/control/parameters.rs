@@ -114,7 +114,9 @@ pub struct Estimator {
     pub method: EstimatorMethod,
     /// `j`: how many past inputs the output remembers.
     pub response_length: usize,
-    /// The predictor of each mode.
+    /// `L`: samples in the window of [`EstimatorMethod::Sliding`], more than `m j`.
+    pub window: usize,
+    /// The predictor of each mode; none for the other methods.
     pub predictors: Vec<Predictor>,
     /// The periodic disturbance whose response is learned on line.
     pub harmonics: Option<Harmonics>,

@@ -1,7 +1,7 @@
 //! The design as a record: plain data, everything the exporter ships and the FMUs read.
 
 use crate::control::ControllerParameters;
-use crate::simulate::Scenario;
+use crate::simulate::{Scenario, Truth};
 use serde::{Deserialize, Serialize};
 
 /// Version of the record's layout; an FMU refuses a record of another.
@@ -18,6 +18,9 @@ pub struct Design {
     pub signals: Signals,
     /// The controller, with the plant it was designed for.
     pub controller: ControllerParameters,
+    /// What the simulated plant really is.
+    #[serde(default)]
+    pub truth: Truth,
     /// The experiment the plant FMU plays.
     pub scenario: Scenario,
 }

@@ -11,6 +11,7 @@
 //! disturbance and `f` the additive sensor fault. Everything is in the user's physical units.
 
 mod dimensions;
+pub mod rectifier;
 pub mod scaling;
 
 pub use dimensions::Dimensions;

@@ -1,7 +1,7 @@
 //! Per-unit scaling: the numbers a solver sees should be near one.
 
 use super::{Mode, SwitchedPlant};
-use nalgebra::DMatrix;
+use nalgebra::{DMatrix, DVector};
 
 /// Nominal magnitudes by which each signal is divided (all positive).
 #[derive(Clone, Debug, PartialEq)]
@@ -21,6 +21,48 @@ impl Scaling {
             states: vec![1.0; states],
             inputs: vec![1.0; inputs],
             outputs: vec![1.0; outputs],
+        }
+    }
+
+    /// Finds nominal magnitudes from the plant alone: those that bring the logarithms of all
+    /// non-zero entries of `A` (off the diagonal), `B`, `C`, `E` and `F` nearest to zero in the
+    /// least-squares sense, the disturbances' own magnitudes being free.
+    pub fn automatic(plant: &SwitchedPlant) -> Self {
+        let dims = plant.dimensions();
+        let (n, m, p) = (dims.states, dims.inputs, dims.outputs);
+        let [state, input, output, disturbance] = [0, n, n + m, n + m + p];
+        let mut entries = Vec::new();
+        for mode in &plant.modes {
+            for (matrix, row, column) in [
+                (&mode.a, state, state),
+                (&mode.b, state, input),
+                (&mode.c, output, state),
+                (&mode.e, state, disturbance),
+                (&mode.f, output, disturbance),
+            ] {
+                for c in 0..matrix.ncols() {
+                    for r in 0..matrix.nrows() {
+                        let value = matrix[(r, c)].abs();
+                        if value.is_normal() && row + r != column + c {
+                            entries.push((row + r, column + c, value.ln()));
+                        }
+                    }
+                }
+            }
+        }
+        let unknowns = disturbance + dims.disturbances;
+        let logarithms = balance(&entries, unknowns);
+        let magnitudes = |first: usize, count: usize| -> Vec<f64> {
+            logarithms
+                .rows(first, count)
+                .iter()
+                .map(|l| l.exp())
+                .collect()
+        };
+        Self {
+            states: magnitudes(state, n),
+            inputs: magnitudes(input, m),
+            outputs: magnitudes(output, p),
         }
     }
 
@@ -51,6 +93,32 @@ impl Scaling {
             modes,
         }
     }
+}
+
+/// The shortest vector `l` that minimises the sum of `(value - l[row] + l[column])^2`.
+fn balance(entries: &[(usize, usize, f64)], unknowns: usize) -> DVector<f64> {
+    let mut normal = DMatrix::<f64>::zeros(unknowns, unknowns);
+    let mut right = DVector::<f64>::zeros(unknowns);
+    for &(row, column, value) in entries {
+        normal[(row, row)] += 1.0;
+        normal[(column, column)] += 1.0;
+        normal[(row, column)] -= 1.0;
+        normal[(column, row)] -= 1.0;
+        right[row] += value;
+        right[column] -= value;
+    }
+    // The normal matrix is a graph's Laplacian: its eigenvalues are zero or not small.
+    let eigen = normal.symmetric_eigen();
+    let threshold = 1e-10 * unknowns as f64;
+    let coordinates = eigen.eigenvectors.tr_mul(&right);
+    let filtered = coordinates.zip_map(&eigen.eigenvalues, |coordinate, value| {
+        if value > threshold {
+            coordinate / value
+        } else {
+            0.0
+        }
+    });
+    eigen.eigenvectors * filtered
 }
 
 /// Divides each row by `rows` and multiplies each column by `columns`.

@@ -1,11 +1,14 @@
 //! Trying the loop before trusting it: a plant under a scenario, the closed loop, its figures of merit.
 
 pub mod closed_loop;
+pub mod integrate;
 pub mod metrics;
 pub mod noise;
 pub mod plant;
 pub mod scenario;
+pub mod truth;
 
 pub use closed_loop::{Trajectory, Variant, run};
 pub use plant::{PlantSimulator, PlantState};
 pub use scenario::Scenario;
+pub use truth::Truth;

@@ -2,6 +2,7 @@
 
 use super::noise;
 use super::scenario::Scenario;
+use super::truth::{self, Truth};
 use crate::control::kernel;
 use crate::plant::SwitchedPlant;
 use serde::{Deserialize, Serialize};
@@ -10,6 +11,7 @@ use serde::{Deserialize, Serialize};
 #[derive(Clone, Debug)]
 pub struct PlantSimulator {
     plant: SwitchedPlant,
+    truth: Truth,
     scenario: Scenario,
     /// `x0 - A x0 - B u0` per mode (n).
     state_offsets: Vec<Vec<f64>>,
@@ -58,8 +60,14 @@ pub struct PlantState {
 }
 
 impl PlantSimulator {
-    /// Prepares a plant; the scenario's signals must have the plant's sizes.
+    /// Prepares a plant that is what it was designed for; see [`with_truth`](Self::with_truth).
     pub fn new(plant: SwitchedPlant, scenario: Scenario) -> Self {
+        Self::with_truth(plant, Truth::AsDesigned, scenario)
+    }
+
+    /// Prepares a plant; the scenario's signals and the truth must have the design's sizes.
+    pub fn with_truth(designed: SwitchedPlant, truth: Truth, scenario: Scenario) -> Self {
+        let plant = truth.linear(&designed).clone();
         let collect = |v: nalgebra::DVector<f64>| v.iter().copied().collect::<Vec<f64>>();
         let state_offsets = plant
             .modes
@@ -73,6 +81,7 @@ impl PlantSimulator {
             .collect();
         Self {
             plant,
+            truth,
             scenario,
             state_offsets,
             output_offsets,
@@ -154,6 +163,22 @@ impl PlantSimulator {
 
     /// Moves to the next tick under input `u` (m), held over the sample.
     pub fn advance(&self, state: &mut PlantState, u: &[f64]) {
+        match &self.truth {
+            Truth::Rectifier(rectifier) => truth::advance_rectifier(
+                rectifier,
+                state.mode,
+                &mut state.x,
+                u,
+                &state.disturbance,
+                self.plant.sample_time,
+            ),
+            Truth::AsDesigned | Truth::Linear { .. } => self.advance_linear(state, u),
+        }
+        kernel::bound(&mut state.x);
+        state.tick += 1;
+    }
+
+    fn advance_linear(&self, state: &mut PlantState, u: &[f64]) {
         let mode = &self.plant.modes[state.mode];
         kernel::affine(
             &mut state.next,
@@ -163,9 +188,7 @@ impl PlantSimulator {
         );
         kernel::add_product(&mut state.next, &mode.b, u);
         kernel::add_product(&mut state.next, &mode.e, &state.disturbance);
-        kernel::bound(&mut state.next);
         kernel::copy(&mut state.x, &state.next);
-        state.tick += 1;
     }
 
     fn draw_noise(&self, state: &mut PlantState, on: bool) {

@@ -9,15 +9,34 @@
 mod decision;
 mod harmonics;
 mod predictor;
+mod window;
 
 pub use decision::{Decision, Verdict};
 pub use harmonics::HarmonicState;
 pub use predictor::{InputHistory, leverage};
+pub use window::SlidingWindow;
 
 use super::compensation::is_measurement;
 use super::kernel;
 use super::parameters::{Estimator, EstimatorMethod};
 use serde::{Deserialize, Serialize};
+
+/// One sample as the estimator sees it.
+#[derive(Clone, Copy, Debug)]
+pub struct Observation<'a> {
+    /// Number of the tick.
+    pub tick: u64,
+    /// Active mode (0-based).
+    pub mode: usize,
+    /// Input of the mode's operating point (m).
+    pub u0: &'a [f64],
+    /// Output of the mode's operating point (p).
+    pub y0: &'a [f64],
+    /// Measurement (p).
+    pub y: &'a [f64],
+    /// Decision thresholds (p).
+    pub thresholds: &'a [f64],
+}
 
 /// What the estimator remembers, and what it last said.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -28,6 +47,8 @@ pub struct EstimatorState {
     /// Per mode: the learned response to the periodic disturbance.
     harmonics: Vec<HarmonicState>,
     decisions: Vec<Decision>,
+    /// The window of the printed method, where it is chosen.
+    window: Option<SlidingWindow>,
     /// Predicted output `y_hat` (p).
     pub prediction: Vec<f64>,
     /// Residual `r_c = y - y_hat` (p); keeps its last value where the measurement is not a number.
@@ -54,6 +75,13 @@ impl EstimatorState {
             history: InputHistory::new(inputs, estimator.response_length),
             hold: estimator.response_length,
             harmonics,
+            window: (estimator.method == EstimatorMethod::Sliding).then(|| {
+                SlidingWindow::new(
+                    inputs.len() * estimator.response_length,
+                    outputs,
+                    estimator.window,
+                )
+            }),
             decisions: vec![Decision::default(); outputs],
             prediction: vec![0.0; outputs],
             residual: vec![0.0; outputs],
@@ -62,14 +90,12 @@ impl EstimatorState {
         }
     }
 
-    /// Forgets every input but `inputs`, as if it had acted for ever.
-    pub fn restart(&mut self, inputs: &[f64]) {
-        self.history.fill(inputs);
-    }
-
     /// Called on entering a mode: the regressor mixes modes for `response_length` samples.
     pub fn mode_entered(&mut self, estimator: &Estimator) {
         self.hold = estimator.response_length;
+        if let Some(window) = &mut self.window {
+            window.clear();
+        }
     }
 
     /// Whether the prediction can be used in place of a measurement now.
@@ -77,56 +103,59 @@ impl EstimatorState {
         estimator.method == EstimatorMethod::Reference && self.hold == 0
     }
 
-    /// Judges measurement `y` (p) of tick `tick` in `mode`; `u0` and `y0` are its operating point.
-    #[allow(clippy::too_many_arguments)]
-    pub fn observe(
-        &mut self,
-        estimator: &Estimator,
-        tick: u64,
-        mode: usize,
-        u0: &[f64],
-        y0: &[f64],
-        y: &[f64],
-        thresholds: &[f64],
-    ) {
-        let Some(predictor) = estimator.predictors.get(mode) else {
-            return;
+    /// Judges one sample, sensor by sensor.
+    pub fn observe(&mut self, estimator: &Estimator, seen: &Observation<'_>) {
+        self.history.regress(seen.u0);
+        let widening = match estimator.method {
+            EstimatorMethod::Reference => self.predict(estimator, seen),
+            EstimatorMethod::Sliding => self.slide(seen),
+            EstimatorMethod::None => None,
         };
-        self.history.regress(u0);
-        kernel::affine(
-            &mut self.prediction,
-            y0,
-            &predictor.response,
-            self.history.regressor(),
-        );
-        let leverage = self.history.leverage(&predictor.factor);
-        let harmonics = self
-            .harmonics
-            .get_mut(mode)
-            .zip(estimator.harmonics.as_ref());
-        let spread = 1.0
-            + leverage
-            + harmonics.map_or(0.0, |(learned, known)| {
-                learned.rotate(known, tick);
-                learned.add_response(&mut self.prediction);
-                learned.leverage()
-            });
-        kernel::bound(&mut self.prediction);
-        self.take_residual(y);
-        let trusted = self.hold == 0 && leverage <= estimator.leverage_limit;
-        let healthy = self.decide(
-            estimator,
-            y,
-            thresholds,
-            trusted.then(|| libm::sqrt(spread)),
-        );
+        let healthy = self.decide(estimator, seen, widening);
         if healthy
-            && let Some(learned) = self.harmonics.get_mut(mode)
+            && let Some(learned) = self.harmonics.get_mut(seen.mode)
             && let Some(known) = &estimator.harmonics
         {
             learned.learn(known, &self.residual);
         }
         self.hold = self.hold.saturating_sub(1);
+    }
+
+    /// The reference window: leaves prediction and residual, and returns by how much to widen the
+    /// thresholds; nothing while the residual cannot be trusted.
+    fn predict(&mut self, estimator: &Estimator, seen: &Observation<'_>) -> Option<f64> {
+        let predictor = estimator.predictors.get(seen.mode)?;
+        kernel::affine(
+            &mut self.prediction,
+            seen.y0,
+            &predictor.response,
+            self.history.regressor(),
+        );
+        let leverage = self.history.leverage(&predictor.factor);
+        let mut spread = 1.0 + leverage;
+        if let Some(learned) = self.harmonics.get_mut(seen.mode)
+            && let Some(known) = &estimator.harmonics
+        {
+            learned.rotate(known, seen.tick);
+            learned.add_response(&mut self.prediction);
+            spread += learned.leverage();
+        }
+        kernel::bound(&mut self.prediction);
+        let pairs = self.residual.iter_mut().zip(seen.y).zip(&self.prediction);
+        for ((residual, &value), &predicted) in pairs {
+            if is_measurement(value) {
+                *residual = value - predicted;
+            }
+        }
+        let trusted = self.hold == 0 && leverage <= estimator.leverage_limit;
+        trusted.then(|| libm::sqrt(spread))
+    }
+
+    /// The sliding window as printed: leaves the residual; nothing until the window is full.
+    fn slide(&mut self, seen: &Observation<'_>) -> Option<f64> {
+        let window = self.window.as_mut().filter(|_| self.hold == 0)?;
+        window.residual(self.history.regressor(), seen.y, &mut self.residual);
+        window.full().then_some(1.0)
     }
 
     /// Remembers the input that acts over the coming sample (m).
@@ -139,8 +168,7 @@ impl EstimatorState {
     fn decide(
         &mut self,
         estimator: &Estimator,
-        y: &[f64],
-        thresholds: &[f64],
+        seen: &Observation<'_>,
         widening: Option<f64>,
     ) -> bool {
         let mut healthy = widening.is_some();
@@ -149,10 +177,11 @@ impl EstimatorState {
             .iter_mut()
             .zip(&mut self.fault)
             .zip(&mut self.flagged);
-        let signals = y
+        let signals = seen
+            .y
             .iter()
             .zip(&self.residual)
-            .zip(thresholds.iter().zip(&estimator.largest_fault));
+            .zip(seen.thresholds.iter().zip(&estimator.largest_fault));
         for (((decision, fault), flagged), ((&value, &residual), (&threshold, &largest))) in
             sensors.zip(signals)
         {
@@ -172,14 +201,5 @@ impl EstimatorState {
             healthy &= !*flagged && verdict == Verdict::Healthy;
         }
         healthy
-    }
-
-    fn take_residual(&mut self, y: &[f64]) {
-        let pairs = self.residual.iter_mut().zip(y).zip(&self.prediction);
-        for ((residual, &value), &predicted) in pairs {
-            if is_measurement(value) {
-                *residual = value - predicted;
-            }
-        }
     }
 }

@@ -29,13 +29,6 @@ impl InputHistory {
         }
     }
 
-    /// As if `inputs` (m) had acted for ever.
-    pub fn fill(&mut self, inputs: &[f64]) {
-        for sample in self.inputs.chunks_exact_mut(self.width) {
-            kernel::copy(sample, inputs);
-        }
-    }
-
     /// Appends the input that acts over the coming sample (m) and forgets the oldest.
     pub fn push(&mut self, acting: &[f64]) {
         if self.inputs.len() < self.width {

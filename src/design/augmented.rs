@@ -1,0 +1,88 @@
+//! The model a controller is designed on: plant, latency, integral action, performance signal.
+//!
+//! With `x~ = [x; u_prev; Z]` (`u_prev` only under latency 1) a mode reads
+//!
+//! ```text
+//! x~(k+1) = A x~(k) + B u(k) + E w(k)       Z(k+1) = Z(k) - Te S (C x(k) + F w(k))    (2), (19), (24)
+//! v(k)    = H x~(k) + D u(k)                v = [W_y S C x; W_z Z; W_u u]
+//! ```
+
+use super::{ControlSpec, Units};
+use crate::plant::{Mode, SwitchedPlant};
+use nalgebra::DMatrix;
+
+/// One mode of the augmented model, in the units it was built with.
+#[derive(Clone, Debug, PartialEq)]
+pub struct AugmentedMode {
+    /// State matrix (d x d), `d = n + latency m + r`.
+    pub a: DMatrix<f64>,
+    /// Input matrix (d x m).
+    pub b: DMatrix<f64>,
+    /// Disturbance matrix (d x s).
+    pub e: DMatrix<f64>,
+    /// State to performance signal ((2r + m) x d).
+    pub h: DMatrix<f64>,
+    /// Input to performance signal ((2r + m) x m).
+    pub d: DMatrix<f64>,
+}
+
+/// The augmented model of every mode. Each entry is one product of given numbers (and exact powers
+/// of two), so it carries at most one rounding.
+pub fn augment(plant: &SwitchedPlant, spec: &ControlSpec, units: &Units) -> Vec<AugmentedMode> {
+    let modes = plant.modes.iter();
+    modes
+        .map(|mode| augment_mode(mode, plant.sample_time, spec, units))
+        .collect()
+}
+
+fn augment_mode(mode: &Mode, sample_time: f64, spec: &ControlSpec, units: &Units) -> AugmentedMode {
+    let (n, m, s) = (mode.a.nrows(), mode.b.ncols(), mode.e.ncols());
+    let r = spec.tracked.len();
+    let previous = spec.latency * m;
+    let (first_z, size) = (n + previous, n + previous + r);
+
+    let mut a = DMatrix::zeros(size, size);
+    let mut b = DMatrix::zeros(size, m);
+    let mut e = DMatrix::zeros(size, s);
+    let mut h = DMatrix::zeros(2 * r + m, size);
+    let mut d = DMatrix::zeros(2 * r + m, m);
+
+    let input = scaled(&mode.b, &units.states, &units.inputs);
+    a.view_mut((0, 0), (n, n))
+        .copy_from(&scaled(&mode.a, &units.states, &units.states));
+    if spec.latency == 0 {
+        b.view_mut((0, 0), (n, m)).copy_from(&input);
+    } else {
+        a.view_mut((0, n), (n, m)).copy_from(&input);
+        b.view_mut((n, 0), (m, m)).fill_with_identity();
+    }
+    let all_disturbances = vec![units.disturbance; s];
+    e.view_mut((0, 0), (n, s))
+        .copy_from(&scaled(&mode.e, &units.states, &all_disturbances));
+
+    for (row, &output) in spec.tracked.iter().enumerate() {
+        let z = first_z + row;
+        let integrator = units.integrators[row];
+        a[(z, z)] = 1.0;
+        for k in 0..n {
+            let c = mode.c[(output, k)] * units.states[k];
+            a[(z, k)] = -sample_time * (c / integrator);
+            h[(row, k)] = spec.output_weight[row] * (c / units.performance);
+        }
+        for k in 0..s {
+            e[(z, k)] = -sample_time * (mode.f[(output, k)] * units.disturbance / integrator);
+        }
+        h[(r + row, z)] = spec.integral_weight[row] * (integrator / units.performance);
+    }
+    for k in 0..m {
+        d[(2 * r + k, k)] = spec.input_weight[k] * (units.inputs[k] / units.performance);
+    }
+    AugmentedMode { a, b, e, h, d }
+}
+
+/// `rows^-1 matrix columns`; exact when the units are powers of two.
+pub(crate) fn scaled(matrix: &DMatrix<f64>, rows: &[f64], columns: &[f64]) -> DMatrix<f64> {
+    DMatrix::from_fn(matrix.nrows(), matrix.ncols(), |r, c| {
+        matrix[(r, c)] / rows[r] * columns[c]
+    })
+}

@@ -1,0 +1,252 @@
+//! Proofs, after rounding, of everything a design promises.
+//!
+//! A certificate holds Lyapunov matrices and the units they were found in. [`verify`] rebuilds
+//! every inequality from the plant and the shipped gains with a bound on each rounding error made
+//! on the way ([`Enclosure`]), and proves it positive definite. No solver takes part.
+//!
+//! For gains `K~` and the closed loop `A_i + B_i K~_i` the inequalities are (T2) with `R = K~ G` and
+//! `G_i = S_i`, which the solver's solution implies for every `G_i`.
+//!
+//! [`verify`]: crate::design::StateFeedback::verify
+
+mod enclosure;
+
+pub use enclosure::Enclosure;
+
+use super::augmented::{AugmentedMode, augment, scaled};
+use super::state_feedback::{ModeGains, StateFeedback};
+use super::verdict::{BlockKind, BlockName};
+use super::{DwellTime, Lyapunov, Units};
+use crate::plant::{Dimensions, SwitchedPlant};
+use crate::rows;
+use nalgebra::DMatrix;
+use serde::{Deserialize, Serialize};
+
+/// A Lyapunov matrix `S` of the function `x' S^-1 x`, in the certificate's units.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(transparent)]
+pub struct LyapunovMatrix(
+    /// Symmetric, positive definite (d x d).
+    #[serde(with = "rows")]
+    pub DMatrix<f64>,
+);
+
+/// What, beside the plant and the gains, it takes to prove a state feedback.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct ControlCertificate {
+    /// Units (powers of two) in which the inequalities are stated.
+    pub units: Units,
+    /// One matrix for `common`, else one per mode.
+    pub lyapunov: Vec<LyapunovMatrix>,
+}
+
+/// Why a certificate does not check.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum CertificateError {
+    /// An inequality could not be proved.
+    #[error("the {0} could not be proved")]
+    Unproved(BlockName),
+    /// Sizes, units or claims do not fit the plant; one sentence says which.
+    #[error("{0}")]
+    Malformed(String),
+}
+
+/// Proves a claim about a mode and its successor (indices from 0).
+pub(crate) fn prove(
+    claim: &Enclosure,
+    kind: BlockKind,
+    mode: usize,
+    successor: usize,
+) -> Result<(), CertificateError> {
+    match claim.is_positive_definite() {
+        true => Ok(()),
+        false => Err(CertificateError::Unproved(BlockName::new(
+            kind, mode, successor,
+        ))),
+    }
+}
+
+/// The closed loop of one mode, enclosed.
+struct ClosedLoop {
+    /// `A + B K~` (d x d).
+    a: Enclosure,
+    /// `E` (d x s).
+    e: Enclosure,
+    /// `H + D K~`.
+    h: Enclosure,
+}
+
+impl ClosedLoop {
+    fn new(model: AugmentedMode, gain: DMatrix<f64>) -> Self {
+        let gain = Enclosure::exact(gain);
+        let [a, b, e, h, d] = [model.a, model.b, model.e, model.h, model.d].map(Enclosure::rounded);
+        Self {
+            a: &a + &(&b * &gain),
+            e,
+            h: &h + &(&d * &gain),
+        }
+    }
+}
+
+/// Proves everything a state feedback claims: decay, attenuation, dwell time.
+pub(crate) fn verify_state_feedback(
+    plant: &SwitchedPlant,
+    design: &StateFeedback,
+) -> Result<(), CertificateError> {
+    check_sizes(plant, design)?;
+    let (spec, certificate) = (&design.spec, &design.certificate);
+    let (units, modes) = (&certificate.units, plant.modes.len());
+    let loops: Vec<ClosedLoop> = augment(plant, spec, units)
+        .into_iter()
+        .zip(&design.modes)
+        .map(|(model, gains)| ClosedLoop::new(model, scaled_gain(gains, units, spec.latency)))
+        .collect();
+    let matrices: Vec<Enclosure> = certificate
+        .lyapunov
+        .iter()
+        .map(|matrix| Enclosure::exact(matrix.0.clone()))
+        .collect();
+    let lyapunov = |mode: usize| &matrices[spec.lyapunov.index(mode)];
+
+    for (i, j) in spec.lyapunov.pairs(modes) {
+        let decay = decay_block(&loops[i].a, lyapunov(i), lyapunov(j), spec.decay);
+        prove(&decay, BlockKind::Decay, i, j)?;
+        if let Some(gamma) = &design.gamma {
+            let level = gamma[i] * units.disturbance / units.performance;
+            let block = attenuation_block(&loops[i], lyapunov(i), lyapunov(j), level);
+            prove(&block, BlockKind::Attenuation, i, j)?;
+        }
+    }
+    match &design.dwell {
+        Some(dwell) => prove_dwell(&matrices, dwell, spec.decay, plant.sample_time),
+        None => Ok(()),
+    }
+}
+
+/// `[alpha^2 S_i (A S_i)'; . S_j]`.
+pub(crate) fn decay_block(
+    a: &Enclosure,
+    own: &Enclosure,
+    next: &Enclosure,
+    decay: f64,
+) -> Enclosure {
+    let size = own.shape().0;
+    Enclosure::symmetric_blocks(&[
+        vec![&Enclosure::square_times_identity(decay, size) * own],
+        vec![a * own, next.clone()],
+    ])
+}
+
+/// `[S_i 0 (A S_i)' (H S_i)'; . gamma^2 I E' 0; . . S_j 0; . . . I]`.
+fn attenuation_block(
+    closed: &ClosedLoop,
+    own: &Enclosure,
+    next: &Enclosure,
+    gamma: f64,
+) -> Enclosure {
+    let (size, disturbances) = closed.e.shape();
+    let signals = closed.h.shape().0;
+    Enclosure::symmetric_blocks(&[
+        vec![own.clone()],
+        vec![
+            Enclosure::zeros(disturbances, size),
+            Enclosure::square_times_identity(gamma, disturbances),
+        ],
+        vec![&closed.a * own, closed.e.clone(), next.clone()],
+        vec![
+            &closed.h * own,
+            Enclosure::zeros(signals, disturbances),
+            Enclosure::zeros(signals, size),
+            Enclosure::exact(DMatrix::identity(signals, signals)),
+        ],
+    ])
+}
+
+/// `mu S_j - S_i` for every switch from `i` to `j`, and the dwell time that follows from `mu`.
+pub(crate) fn prove_dwell(
+    matrices: &[Enclosure],
+    dwell: &DwellTime,
+    decay: f64,
+    sample_time: f64,
+) -> Result<(), CertificateError> {
+    let claimed = DwellTime::new(dwell.mu, decay, sample_time);
+    let stated = dwell.samples >= claimed.samples && dwell.seconds >= claimed.seconds;
+    if !(stated && dwell.mu >= 1.0 && decay < 1.0) {
+        return Err(CertificateError::Malformed(
+            "the dwell time does not follow from mu and the decay rate".into(),
+        ));
+    }
+    for (i, own) in matrices.iter().enumerate() {
+        for (j, next) in matrices.iter().enumerate().filter(|(j, _)| *j != i) {
+            let factor = DMatrix::from_diagonal_element(own.shape().0, own.shape().0, dwell.mu);
+            let ratio = &(&Enclosure::exact(factor) * next) - own;
+            prove(&ratio, BlockKind::LyapunovRatio, i, j)?;
+        }
+    }
+    Ok(())
+}
+
+/// `K~ = [K, K_u, G]` in the certificate's units.
+fn scaled_gain(gains: &ModeGains, units: &Units, latency: usize) -> DMatrix<f64> {
+    let m = units.inputs.len();
+    let previous = if latency == 0 { 0 } else { m };
+    let (n, r) = (units.states.len(), units.integrators.len());
+    let mut gain = DMatrix::zeros(m, n + previous + r);
+    gain.columns_mut(0, n)
+        .copy_from(&scaled(&gains.state_feedback, &units.inputs, &units.states));
+    if latency == 1 {
+        let block = scaled(&gains.previous_input, &units.inputs, &units.inputs);
+        gain.columns_mut(n, m).copy_from(&block);
+    }
+    let integral = scaled(&gains.integral, &units.inputs, &units.integrators);
+    gain.columns_mut(n + previous, r).copy_from(&integral);
+    gain
+}
+
+/// Everything [`verify_state_feedback`] indexes has the size it must have.
+fn check_sizes(plant: &SwitchedPlant, design: &StateFeedback) -> Result<(), CertificateError> {
+    let malformed = CertificateError::Malformed;
+    let dims = Dimensions::check(plant).map_err(malformed)?;
+    let (spec, certificate) = (&design.spec, &design.certificate);
+    spec.check(dims).map_err(malformed)?;
+    let (n, m, r) = (dims.states, dims.inputs, spec.tracked.len());
+    let (modes, previous) = (plant.modes.len(), spec.latency * m);
+    let size = n + previous + r;
+    let gains_fit = design.modes.len() == modes
+        && design.modes.iter().all(|gains| {
+            gains.state_feedback.shape() == (m, n)
+                && gains.integral.shape() == (m, r)
+                && gains.previous_input.shape() == (m, previous)
+        });
+    let matrices_fit = certificate.lyapunov.len() == spec.lyapunov.matrices(modes)
+        && certificate
+            .lyapunov
+            .iter()
+            .all(|matrix| matrix.0.shape() == (size, size));
+    let gamma_fits = design
+        .gamma
+        .as_ref()
+        .is_none_or(|gamma| gamma.len() == modes && gamma.iter().all(|g| *g >= 0.0));
+    let dwell_fits = design.dwell.is_some() == (spec.lyapunov == Lyapunov::Dwell);
+    for (fits, what) in [
+        (gains_fit, "the gains do not have the sizes of the plant"),
+        (
+            matrices_fit,
+            "the Lyapunov matrices do not have the sizes of the augmented model",
+        ),
+        (gamma_fits, "gamma is not one number >= 0 per mode"),
+        (
+            dwell_fits,
+            "a dwell time belongs to the dwell guarantee, and to it only",
+        ),
+        (
+            certificate.units.fit(plant, r),
+            "the units are not one power of two per signal",
+        ),
+    ] {
+        if !fits {
+            return Err(malformed(what.into()));
+        }
+    }
+    Ok(())
+}

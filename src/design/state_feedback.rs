@@ -1,0 +1,64 @@
+//! State feedback with integral action: theorems T1 (stability) and T2 (attenuation).
+//!
+//! The command is `u = K x + K_u u_prev + G Z`, with one set of gains per mode.
+
+#[cfg(feature = "design")]
+mod advice;
+#[cfg(feature = "design")]
+mod synthesis;
+
+#[cfg(feature = "design")]
+pub use synthesis::synthesise;
+
+use super::certificate::{self, CertificateError, ControlCertificate};
+use super::{ControlSpec, DwellTime};
+use crate::plant::SwitchedPlant;
+use crate::rows;
+use nalgebra::DMatrix;
+use serde::{Deserialize, Serialize};
+
+/// The gains of one mode, in physical units.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct ModeGains {
+    /// `K_i` (m x n), multiplies the deviation of the state from the operating point.
+    #[serde(with = "rows")]
+    pub state_feedback: DMatrix<f64>,
+    /// `G_i` (m x r), multiplies the integral of the tracking error.
+    #[serde(with = "rows")]
+    pub integral: DMatrix<f64>,
+    /// Multiplies the command that is acting now (m x m); no columns without latency.
+    #[serde(with = "rows")]
+    pub previous_input: DMatrix<f64>,
+}
+
+/// A certified state feedback.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct StateFeedback {
+    /// What was asked for.
+    pub spec: ControlSpec,
+    /// The gains of each mode.
+    pub modes: Vec<ModeGains>,
+    /// Proved bound of the l2 gain from the disturbance to the performance signal while the mode
+    /// is active (one number per mode, equal under `common` and `switched`); absent when only
+    /// decay was asked for or the plant knows no disturbance.
+    pub gamma: Option<Vec<f64>>,
+    /// The solver's own optimum of `gamma`, for comparison; not proved.
+    pub optimum: Option<Vec<f64>>,
+    /// Spectral radius of each mode's closed loop (floating point; the certificate proves the
+    /// decay).
+    pub spectral_radius: Vec<f64>,
+    /// How long modes must last, under [`Lyapunov::Dwell`](super::Lyapunov::Dwell).
+    pub dwell: Option<DwellTime>,
+    /// What proves it.
+    pub certificate: ControlCertificate,
+}
+
+impl StateFeedback {
+    /// Proves, from these very doubles, decay, attenuation and dwell time on this plant.
+    ///
+    /// # Errors
+    /// The first inequality that cannot be proved, or what does not fit.
+    pub fn verify(&self, plant: &SwitchedPlant) -> Result<(), CertificateError> {
+        certificate::verify_state_feedback(plant, self)
+    }
+}

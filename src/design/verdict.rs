@@ -1,0 +1,185 @@
+//! Verdicts a person can use: which inequality, what went wrong, what to try.
+
+use serde::{Deserialize, Serialize};
+use std::fmt;
+
+/// What an inequality demands.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum BlockKind {
+    /// The closed loop's state shrinks by the decay rate each sample.
+    Decay,
+    /// The disturbance reaches the performance signal attenuated to gamma.
+    Attenuation,
+    /// The observer's error shrinks by its decay rate each sample.
+    ObserverDecay,
+    /// The Lyapunov functions of two modes differ by at most the factor mu.
+    LyapunovRatio,
+    /// The Lyapunov matrix itself is positive definite.
+    Lyapunov,
+}
+
+/// The name of an inequality: its kind, the mode, and the mode that follows it.
+#[derive(Clone, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
+pub struct BlockName {
+    /// What it demands.
+    pub kind: BlockKind,
+    /// Number of the active mode, from 1.
+    pub mode: usize,
+    /// Number of the mode that is active one sample later, from 1.
+    pub successor: usize,
+}
+
+impl BlockName {
+    /// Names an inequality by mode *indices* (from 0).
+    pub fn new(kind: BlockKind, mode: usize, successor: usize) -> Self {
+        Self {
+            kind,
+            mode: mode + 1,
+            successor: successor + 1,
+        }
+    }
+}
+
+impl fmt::Display for BlockName {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let kind = match self.kind {
+            BlockKind::Decay => "decay",
+            BlockKind::Attenuation => "attenuation",
+            BlockKind::ObserverDecay => "observer decay",
+            BlockKind::LyapunovRatio => "Lyapunov ratio",
+            BlockKind::Lyapunov => "Lyapunov matrix",
+        };
+        write!(f, "{kind} of mode {}", self.mode)?;
+        if self.successor != self.mode {
+            write!(f, " when mode {} follows", self.successor)?;
+        }
+        Ok(())
+    }
+}
+
+/// An inequality and how much of the conflict it carries.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct ConflictingBlock {
+    /// Which one.
+    #[serde(flatten)]
+    pub name: BlockName,
+    /// Its share of the dual multiplier, 0 to 1; the shares of all blocks add up to 1.
+    pub weight: f64,
+}
+
+/// A change of the design that was tried on the margin problem and makes it feasible.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Advice {
+    /// Ask for a slower decay.
+    Decay(f64),
+    /// Ask for another kind of stability guarantee.
+    Lyapunov(super::Lyapunov),
+    /// Ask for another kind of guarantee and a slower decay.
+    LyapunovAndDecay(super::Lyapunov, f64),
+    /// Track fewer outputs (indices from 0).
+    Tracked(Vec<usize>),
+}
+
+impl fmt::Display for Advice {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Decay(decay) => write!(f, "a slower decay is feasible: decay = {decay}"),
+            Self::Lyapunov(kind) => {
+                write!(f, "another guarantee is feasible: lyapunov = \"{kind}\"")
+            }
+            Self::LyapunovAndDecay(kind, decay) => write!(
+                f,
+                "another guarantee with a slower decay is feasible: lyapunov = \"{kind}\", decay = {decay}"
+            ),
+            Self::Tracked(outputs) => {
+                let numbers: Vec<String> = outputs.iter().map(|o| (o + 1).to_string()).collect();
+                write!(
+                    f,
+                    "tracking fewer outputs is feasible: tracked = [{}]",
+                    numbers.join(", ")
+                )
+            }
+        }
+    }
+}
+
+/// A conflict between inequalities, found by the margin problem.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Infeasibility {
+    /// The largest `t` for which every normalised inequality holds with `>= t I`; not positive.
+    pub margin: f64,
+    /// Who holds the margin down, the heaviest first.
+    pub blocks: Vec<ConflictingBlock>,
+    /// Changes that were tried and help; empty when none of those tried does.
+    pub advice: Vec<Advice>,
+}
+
+impl fmt::Display for Infeasibility {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(
+            f,
+            "the design is infeasible (best margin {:.1e})",
+            self.margin
+        )?;
+        let heavy: Vec<String> = self
+            .blocks
+            .iter()
+            .take(4)
+            .map(|block| format!("{} ({:.0} %)", block.name, 100.0 * block.weight))
+            .collect();
+        if !heavy.is_empty() {
+            write!(f, ": these conflict: {}", heavy.join(", "))?;
+        }
+        match self.advice.is_empty() {
+            true => write!(
+                f,
+                "; none of the usual changes (slower decay, dwell, fewer tracked outputs) helps"
+            ),
+            false => {
+                let advice: Vec<String> = self.advice.iter().map(ToString::to_string).collect();
+                write!(f, "; {}", advice.join("; "))
+            }
+        }
+    }
+}
+
+/// The solver came back with nothing that could be a solution.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum SolverFailure {
+    /// It claims that no point satisfies the inequalities.
+    #[error("it found the inequalities contradictory")]
+    Contradiction,
+    /// The objective falls without bound.
+    #[error("it found the objective unbounded: give a weight on every input")]
+    Unbounded,
+    /// The iteration limit was reached.
+    #[error("it did not finish within its iteration limit: scale the plant by nominal values")]
+    TooManyIterations,
+    /// Numbers broke down.
+    #[error("its numbers broke down: scale the plant by nominal values")]
+    NumericalTrouble,
+    /// The problem or the settings were refused.
+    #[error("it refused the problem")]
+    Refused,
+}
+
+/// Why there is no design.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum DesignError {
+    /// The request itself cannot be met or is ill-formed; one sentence says why.
+    #[error("{0}")]
+    Request(String),
+    /// The inequalities conflict.
+    #[error("{0}")]
+    Infeasible(Infeasibility),
+    /// The solver failed.
+    #[error("the solver gave no solution: {0}")]
+    Solver(#[from] SolverFailure),
+    /// The gains were found, but their certificate does not check.
+    #[error(
+        "the design could not be certified: {0}; scale the plant by nominal values or ask for a slower decay"
+    )]
+    Uncertified(#[from] super::CertificateError),
+}

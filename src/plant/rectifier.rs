@@ -1,0 +1,229 @@
+//! A three-phase PWM rectifier, averaged, in dq coordinates: the nonlinear plant of scenario B.
+//!
+//! The inner current loops are closed and first order, so the outer loop commands the currents:
+//!
+//! ```text
+//! tau di_d/dt = i_d* - i_d          tau di_q/dt = i_q* - i_q
+//! C v dv/dt   = 3/2 (V i_d - R (i_d^2 + i_q^2)) - 3/2 L (i_d di_d/dt + i_q di_q/dt) - v^2/R_load - v i_w
+//! ```
+//!
+//! State `x = [i_d, i_q, v]` (A, A, V), input `u = [i_d*, i_q*]` (A), output `y = [v, i_q]`,
+//! disturbance `i_w`: the current of a pulsating load (A). One mode per load resistance.
+
+use super::{Mode, OperatingPoint, SwitchedPlant};
+use nalgebra::DMatrix;
+use serde::{Deserialize, Serialize};
+
+/// Physical parameters, SI units.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Rectifier {
+    /// Line inductance `L` in H.
+    pub inductance: f64,
+    /// Line resistance `R` in ohm.
+    pub resistance: f64,
+    /// DC-link capacitance `C` in F.
+    pub capacitance: f64,
+    /// Phase voltage amplitude `V` in V.
+    pub phase_voltage: f64,
+    /// Time constant of the current loops `tau` in s.
+    pub current_loop: f64,
+    /// DC voltage around which each mode is linearised, in V.
+    pub dc_voltage: f64,
+    /// Load resistance per mode in ohm.
+    pub loads: Vec<f64>,
+}
+
+/// `[i_d, i_q, v]`
+pub type RectifierState = [f64; 3];
+
+impl Rectifier {
+    /// `dx/dt` in mode `mode` under command `u` and pulsating load current `w`.
+    pub fn derivative(
+        &self,
+        mode: usize,
+        x: &RectifierState,
+        u: [f64; 2],
+        w: f64,
+    ) -> RectifierState {
+        let [i_d, i_q, v] = *x;
+        let rate_d = (u[0] - i_d) / self.current_loop;
+        let rate_q = (u[1] - i_q) / self.current_loop;
+        let drawn = self.drawn_power(x);
+        let into_coils = 1.5 * self.inductance * (i_d * rate_d + i_q * rate_q);
+        let load = self.loads.get(mode).copied().unwrap_or(f64::INFINITY);
+        let rate_v = ((drawn - into_coils) / v - v / load - w) / self.capacitance;
+        [rate_d, rate_q, rate_v]
+    }
+
+    /// Power taken from the grid less the loss in the line, in W.
+    pub fn drawn_power(&self, x: &RectifierState) -> f64 {
+        let [i_d, i_q, _] = *x;
+        1.5 * (self.phase_voltage * i_d - self.resistance * (i_d * i_d + i_q * i_q))
+    }
+
+    /// Energy in coils and capacitor, in J.
+    pub fn stored_energy(&self, x: &RectifierState) -> f64 {
+        let [i_d, i_q, v] = *x;
+        0.75 * self.inductance * (i_d * i_d + i_q * i_q) + 0.5 * self.capacitance * v * v
+    }
+
+    /// The steady state of a mode at the nominal DC voltage, no reactive current.
+    ///
+    /// # Errors
+    /// The grid cannot supply the load.
+    pub fn operating_point(&self, mode: usize) -> Result<OperatingPoint, String> {
+        let power = self.dc_voltage * self.dc_voltage / self.loads[mode];
+        let half = self.phase_voltage / (2.0 * self.resistance);
+        let root = half * half - power / (1.5 * self.resistance);
+        if root < 0.0 || root.is_nan() {
+            return Err(format!(
+                "mode {}: the grid cannot supply {power:.0} W through {} ohm: raise the load resistance",
+                mode + 1,
+                self.resistance
+            ));
+        }
+        let i_d = half - root.sqrt();
+        Ok(OperatingPoint {
+            x: vec![i_d, 0.0, self.dc_voltage],
+            u: vec![i_d, 0.0],
+            y: vec![self.dc_voltage, 0.0],
+        })
+    }
+
+    /// The switched linear plant: each load linearised at its operating point and discretised exactly
+    /// for an input held over `sample_time` seconds.
+    ///
+    /// # Errors
+    /// The grid cannot supply a load.
+    pub fn linearise(&self, sample_time: f64) -> Result<SwitchedPlant, String> {
+        let modes = (0..self.loads.len())
+            .map(|mode| {
+                let point = self.operating_point(mode)?;
+                let continuous = self.jacobian(mode, &point);
+                let exponential = (continuous * sample_time).exp();
+                Ok(Mode {
+                    name: format!("load {} ohm", self.loads[mode]),
+                    a: exponential.view((0, 0), (3, 3)).into_owned(),
+                    b: exponential.view((0, 3), (3, 2)).into_owned(),
+                    c: DMatrix::from_row_slice(2, 3, &[0.0, 0.0, 1.0, 0.0, 1.0, 0.0]),
+                    e: exponential.view((0, 5), (3, 1)).into_owned(),
+                    f: DMatrix::zeros(2, 1),
+                    operating_point: point,
+                })
+            })
+            .collect::<Result<_, String>>()?;
+        Ok(SwitchedPlant { sample_time, modes })
+    }
+
+    /// `[A B E; 0]` (6 x 6) of the continuous model at an operating point, by central differences.
+    fn jacobian(&self, mode: usize, point: &OperatingPoint) -> DMatrix<f64> {
+        let at = |z: &[f64; 6]| self.derivative(mode, &[z[0], z[1], z[2]], [z[3], z[4]], z[5]);
+        let centre = [
+            point.x[0], point.x[1], point.x[2], point.u[0], point.u[1], 0.0,
+        ];
+        let mut jacobian = DMatrix::zeros(6, 6);
+        for column in 0..6 {
+            let width = 1e-5 * centre[column].abs().max(1.0);
+            let (mut above, mut below) = (centre, centre);
+            above[column] += width;
+            below[column] -= width;
+            let (high, low) = (at(&above), at(&below));
+            for row in 0..3 {
+                jacobian[(row, column)] = (high[row] - low[row]) / (2.0 * width);
+            }
+        }
+        jacobian
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::simulate::integrate::{self, Tolerance};
+
+    fn rectifier() -> Rectifier {
+        Rectifier {
+            inductance: 0.01,
+            resistance: 0.3,
+            capacitance: 2e-3,
+            phase_voltage: 311.0,
+            current_loop: 2e-3,
+            dc_voltage: 600.0,
+            loads: vec![80.0, 40.0],
+        }
+    }
+
+    #[test]
+    fn the_operating_point_is_a_steady_state() {
+        let plant = rectifier();
+        for mode in 0..2 {
+            let point = plant.operating_point(mode).unwrap();
+            let x = [point.x[0], point.x[1], point.x[2]];
+            let rates = plant.derivative(mode, &x, [point.u[0], point.u[1]], 0.0);
+            assert!(rates.iter().all(|r| r.abs() < 1e-6), "{rates:?}");
+        }
+    }
+
+    /// What goes in, less what the loads take, is what is stored.
+    #[test]
+    fn energy_is_conserved() {
+        let plant = rectifier();
+        let tolerance = Tolerance {
+            relative: 1e-10,
+            absolute: 1e-10,
+        };
+        let u = [25.0, -8.0];
+        let balance = |z: &[f64; 4]| {
+            let x = [z[0], z[1], z[2]];
+            let [d, q, v] = plant.derivative(0, &x, u, 1.5);
+            let supplied = plant.drawn_power(&x) - x[2] * x[2] / 80.0 - 1.5 * x[2];
+            [d, q, v, supplied]
+        };
+        let start = [9.7, 0.0, 600.0];
+        let mut z = [start[0], start[1], start[2], 0.0];
+        for _ in 0..40 {
+            integrate::advance(&mut z, 5e-3, tolerance, balance);
+            let gained = plant.stored_energy(&[z[0], z[1], z[2]]) - plant.stored_energy(&start);
+            assert!(
+                (gained - z[3]).abs() < 1e-6 * plant.stored_energy(&start),
+                "{gained} J against {} J",
+                z[3]
+            );
+        }
+        assert!(
+            (z[2] - 600.0).abs() > 10.0,
+            "the trajectory must move: {}",
+            z[2]
+        );
+    }
+
+    /// A small deviation evolves as the linearisation says.
+    #[test]
+    fn the_linearisation_predicts_a_small_step() {
+        let plant = rectifier();
+        let linear = plant.linearise(5e-3).unwrap();
+        let mode = &linear.modes[1];
+        let point = &mode.operating_point;
+        let mut x = [point.x[0], point.x[1], point.x[2]];
+        let tolerance = Tolerance {
+            relative: 1e-11,
+            absolute: 1e-11,
+        };
+        let small = 1e-3;
+        let u = [point.u[0] + small, point.u[1] + small];
+        integrate::advance(&mut x, 5e-3, tolerance, |x| {
+            plant.derivative(1, x, u, small)
+        });
+        let step = &mode.b * nalgebra::DVector::from_element(2, small)
+            + &mode.e * nalgebra::DVector::from_element(1, small);
+        for row in 0..3 {
+            assert!(
+                (x[row] - point.x[row] - step[row]).abs() < 1e-3 * small,
+                "{} {}",
+                x[row] - point.x[row],
+                step[row]
+            );
+        }
+    }
+}

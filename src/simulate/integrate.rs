@@ -1,0 +1,164 @@
+//! Dormand-Prince 5(4) with error control, on the stack: a nonlinear plant's own integrator.
+//!
+//! The step is chosen from the embedded error estimate alone, so the same inputs give the same
+//! bits; nothing is allocated.
+
+/// Relative and absolute error allowed per step.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Tolerance {
+    /// Relative to the state.
+    pub relative: f64,
+    /// Per state.
+    pub absolute: f64,
+}
+
+/// Stage times of the Dormand-Prince tableau are not needed: the systems here do not depend on time explicitly.
+const STAGES: [&[f64]; 6] = [
+    &[1.0 / 5.0],
+    &[3.0 / 40.0, 9.0 / 40.0],
+    &[44.0 / 45.0, -56.0 / 15.0, 32.0 / 9.0],
+    &[
+        19372.0 / 6561.0,
+        -25360.0 / 2187.0,
+        64448.0 / 6561.0,
+        -212.0 / 729.0,
+    ],
+    &[
+        9017.0 / 3168.0,
+        -355.0 / 33.0,
+        46732.0 / 5247.0,
+        49.0 / 176.0,
+        -5103.0 / 18656.0,
+    ],
+    &[
+        35.0 / 384.0,
+        0.0,
+        500.0 / 1113.0,
+        125.0 / 192.0,
+        -2187.0 / 6784.0,
+        11.0 / 84.0,
+    ],
+];
+
+/// Difference between the fifth- and the fourth-order weights.
+const ERROR: [f64; 7] = [
+    71.0 / 57600.0,
+    0.0,
+    -71.0 / 16695.0,
+    71.0 / 1920.0,
+    -17253.0 / 339200.0,
+    22.0 / 525.0,
+    -1.0 / 40.0,
+];
+
+/// The most steps one call may take before it accepts whatever error is left.
+const MOST_STEPS: usize = 10_000;
+
+/// Advances `state` under `derivative` by `duration` seconds.
+pub fn advance<const N: usize>(
+    state: &mut [f64; N],
+    duration: f64,
+    tolerance: Tolerance,
+    derivative: impl Fn(&[f64; N]) -> [f64; N],
+) {
+    let shortest = duration / MOST_STEPS as f64;
+    let mut left = duration;
+    let mut step = duration / 8.0;
+    while left > 0.0 {
+        step = step.clamp(shortest, left.max(shortest)).min(left);
+        let (next, error) = attempt(state, step, tolerance, &derivative);
+        if error <= 1.0 || step <= shortest {
+            *state = next;
+            left -= step;
+            if left <= 1e-12 * duration {
+                return;
+            }
+        }
+        let factor = if error > 0.0 {
+            0.9 * libm::pow(error, -0.2)
+        } else {
+            5.0
+        };
+        step *= factor.clamp(0.2, 5.0);
+    }
+}
+
+/// One step: the fifth-order result and the error in units of the tolerance.
+fn attempt<const N: usize>(
+    state: &[f64; N],
+    step: f64,
+    tolerance: Tolerance,
+    derivative: &impl Fn(&[f64; N]) -> [f64; N],
+) -> ([f64; N], f64) {
+    let mut slopes = [[0.0; N]; 7];
+    slopes[0] = derivative(state);
+    let mut point = *state;
+    for (stage, weights) in STAGES.iter().enumerate() {
+        point = *state;
+        for (slope, weight) in slopes.iter().zip(*weights) {
+            for (value, rate) in point.iter_mut().zip(slope) {
+                *value += step * weight * rate;
+            }
+        }
+        slopes[stage + 1] = derivative(&point);
+    }
+    let mut worst: f64 = 0.0;
+    for (index, (&old, &new)) in state.iter().zip(&point).enumerate() {
+        let estimate: f64 = slopes
+            .iter()
+            .zip(&ERROR)
+            .map(|(slope, weight)| weight * slope[index])
+            .sum();
+        let allowed = tolerance.absolute + tolerance.relative * old.abs().max(new.abs());
+        worst = worst.max((step * estimate).abs() / allowed);
+    }
+    (point, worst)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_oscillator_keeps_its_phase() {
+        let tolerance = Tolerance {
+            relative: 1e-9,
+            absolute: 1e-12,
+        };
+        let mut state = [1.0, 0.0];
+        for _ in 0..100 {
+            advance(&mut state, 0.1, tolerance, |s| [s[1], -s[0]]);
+        }
+        assert!((state[0] - 10f64.cos()).abs() < 1e-7 && (state[1] + 10f64.sin()).abs() < 1e-7);
+    }
+
+    #[test]
+    fn a_tighter_tolerance_gives_a_smaller_error() {
+        let error = |relative| {
+            let mut state = [2.0, 0.0];
+            let van_der_pol = |s: &[f64; 2]| [s[1], (1.0 - s[0] * s[0]) * s[1] - s[0]];
+            advance(
+                &mut state,
+                5.0,
+                Tolerance {
+                    relative,
+                    absolute: relative,
+                },
+                van_der_pol,
+            );
+            let mut exact = [2.0, 0.0];
+            advance(
+                &mut exact,
+                5.0,
+                Tolerance {
+                    relative: 1e-12,
+                    absolute: 1e-12,
+                },
+                van_der_pol,
+            );
+            (state[0] - exact[0]).abs()
+        };
+        assert!(error(1e-6) < 1e-4);
+        assert!(error(1e-9) < 1e-7);
+    }
+}

@@ -1,0 +1,190 @@
+//! The paper's example, built by hand: plant, scenario and a controller with fixed gains.
+#![allow(dead_code, missing_docs)]
+
+use ftc::control::ControllerParameters;
+use ftc::control::parameters::{
+    Compensation, Estimator, EstimatorMethod, FeedbackGains, Gain, Harmonics, Limits, Observer,
+    ObserverKind, StateFeedback,
+};
+use ftc::design::commissioning;
+use ftc::plant::{Mode, OperatingPoint, SwitchedPlant};
+use ftc::simulate::Scenario;
+use ftc::simulate::scenario::{ModeInterval, Waveform};
+use nalgebra::{DMatrix, dmatrix};
+
+/// Where the disturbance enters.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Channel {
+    State,
+    Output,
+}
+
+pub fn plant(channel: Channel) -> SwitchedPlant {
+    let (e, f) = match channel {
+        Channel::State => (dmatrix![1.0; 1.0], dmatrix![0.0; 0.0]),
+        Channel::Output => (dmatrix![0.0; 0.0], dmatrix![1.0; 1.0]),
+    };
+    let mode = |name: &str, a: DMatrix<f64>, b: DMatrix<f64>| Mode {
+        name: name.into(),
+        a,
+        b,
+        c: DMatrix::identity(2, 2),
+        e: e.clone(),
+        f: f.clone(),
+        operating_point: OperatingPoint::zero(2, 2, 2),
+    };
+    SwitchedPlant {
+        sample_time: 1.0,
+        modes: vec![
+            mode(
+                "first",
+                dmatrix![0.6, 0.45; -0.2, 0.3],
+                dmatrix![0.0, 1.0; 1.0, 0.0],
+            ),
+            mode(
+                "second",
+                dmatrix![0.4, -0.3; 0.11, 0.0],
+                DMatrix::identity(2, 2),
+            ),
+        ],
+    }
+}
+
+pub const REFERENCES: [&str; 4] = ["constant", "square", "sine", "levels"];
+
+pub fn reference(name: &str) -> Waveform {
+    match name {
+        "constant" => Waveform::Constant { value: 0.6 },
+        "square" => Waveform::Square {
+            amplitude: 0.6,
+            period: 400.0,
+            offset: 0.0,
+        },
+        "sine" => Waveform::Sine {
+            amplitude: 0.6,
+            period: 400.0,
+            phase: 0.0,
+            offset: 0.0,
+        },
+        _ => Waveform::Steps {
+            points: vec![[0.0, 0.4], [300.0, 0.8], [700.0, -0.2], [1200.0, 0.5]],
+        },
+    }
+}
+
+pub fn scenario(reference: Waveform, noise: f64, disturbances: usize) -> Scenario {
+    let fault = Waveform::Steps {
+        points: vec![[101.0, 0.5], [401.0, 0.0], [1001.0, 0.5]],
+    };
+    Scenario {
+        steps: 1600,
+        noise: vec![noise; 2],
+        seed: 42,
+        schedule: vec![
+            ModeInterval { from: 0.0, mode: 0 },
+            ModeInterval {
+                from: 800.0,
+                mode: 1,
+            },
+        ],
+        reference: vec![reference; 2],
+        fault: vec![fault; 2],
+        events: vec![],
+        disturbance: vec![
+            Waveform::Sine {
+                amplitude: 0.04,
+                period: core::f64::consts::TAU / 0.02,
+                phase: 0.0,
+                offset: 0.0
+            };
+            disturbances
+        ],
+    }
+}
+
+/// Gains from a linear-quadratic design, rounded by hand; an observer that forgets 80 % a sample.
+pub fn controller(channel: Channel, noise: f64) -> ControllerParameters {
+    let plant = plant(channel);
+    let gains = |state_feedback, integral| FeedbackGains {
+        state_feedback,
+        integral,
+        previous_input: DMatrix::zeros(2, 0),
+        anti_windup: DMatrix::zeros(2, 2),
+    };
+    let decoupling = match channel {
+        Channel::State => DMatrix::from_element(2, 2, 0.5),
+        Channel::Output => DMatrix::zeros(2, 2),
+    };
+    let length = commissioning::response_length(&plant.modes).unwrap();
+    let samples = length + commissioning::commissioning_samples(2, length);
+    let predictors: Vec<_> = plant
+        .modes
+        .iter()
+        .zip(1..)
+        .map(|(mode, seed)| {
+            let database = commissioning::commission(mode, &[1.0, 1.0], &[noise; 2], samples, seed);
+            commissioning::predictor(&database, length).unwrap()
+        })
+        .collect();
+    let observer_gains = plant
+        .modes
+        .iter()
+        .map(|mode| {
+            let t = DMatrix::identity(2, 2) - &decoupling * &mode.c;
+            Gain(t * &mode.a * 0.8)
+        })
+        .collect();
+    let thresholds = (0..2)
+        .map(|s| {
+            predictors
+                .iter()
+                .map(|p| 6.0 * p.deviation[s])
+                .fold(1e-3, f64::max)
+        })
+        .collect();
+    ControllerParameters {
+        feedback: StateFeedback {
+            tracked: vec![0, 1],
+            latency: 0,
+            modes: vec![
+                gains(
+                    dmatrix![0.199, -0.827; -1.125, -0.447],
+                    dmatrix![0.0, 0.528; 0.528, -0.001],
+                ),
+                gains(
+                    dmatrix![-0.926, 0.298; -0.109, -0.529],
+                    dmatrix![0.528, 0.001; 0.0, 0.529],
+                ),
+            ],
+        },
+        observer: Observer {
+            kind: if channel == Channel::State {
+                ObserverKind::Uio
+            } else {
+                ObserverKind::Luenberger
+            },
+            note: None,
+            gains: observer_gains,
+            decoupling: vec![vec![Gain(decoupling.clone()); 2]; 2],
+        },
+        estimator: Estimator {
+            method: EstimatorMethod::Reference,
+            response_length: length,
+            window: 2 * (length + 1) + 20,
+            predictors,
+            harmonics: Some(Harmonics {
+                period: core::f64::consts::TAU / 0.02,
+                count: 1,
+                memory: 3000.0,
+                initial_variance: 1e6,
+            }),
+            thresholds,
+            debounce: 1,
+            leverage_limit: 100.0,
+            largest_fault: vec![1e6; 2],
+        },
+        compensation: Compensation::VirtualSensor,
+        input_limits: vec![Limits::default(); 2],
+        plant,
+    }
+}
