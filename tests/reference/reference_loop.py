@@ -77,6 +77,7 @@ class Estimator:
         """Prepares the estimator of a design record."""
         self.modes = record.modes(design)
         self.settings = design["controller"]["estimator"]
+        self.enabled = self.settings["method"] == "reference"
         self.length = self.settings["response_length"]
         self.outputs = len(self.modes[0].y0)
         self.responses = [np.array(p["response"]) for p in self.settings["predictors"]]
@@ -92,18 +93,9 @@ class Estimator:
         self.f_hat = np.zeros(self.outputs)
 
     @property
-    def enabled(self) -> bool:
-        """Whether faults are estimated at all."""
-        return self.settings["method"] != "none"
-
-    @property
     def predicting(self) -> bool:
         """Whether the prediction may stand in for a lost sensor."""
         return self.enabled and self.hold == 0
-
-    def _past_inputs(self, u0: np.ndarray) -> np.ndarray:
-        recent = self.past[-self.length :]
-        return np.concatenate([u - u0 for u in recent])
 
     def _wave(self, tick: int) -> np.ndarray:
         harmonics = self.settings["harmonics"]
@@ -113,11 +105,13 @@ class Estimator:
 
     def judge(self, tick: int, mode: int, y: np.ndarray, *, switched: bool) -> None:
         """Predicts the output, takes the residual, decides sensor by sensor and learns when all are healthy."""
-        if not self.enabled:
-            return
         if switched:
             self.hold = self.length
-        phi = self._past_inputs(self.modes[mode].u0)
+        present = np.isfinite(y)
+        if not self.enabled:
+            self._decide(present, trusted=False, widening=1.0)
+            return
+        phi = np.concatenate([u - self.modes[mode].u0 for u in self.past[-self.length :]])
         undisturbed = self.modes[mode].y0 + self.responses[mode] @ phi
         distance = float(phi @ self.dispersions[mode] @ phi)
         self.y_hat, spread = undisturbed, 1.0 + distance
@@ -125,7 +119,6 @@ class Estimator:
             h = self._wave(tick)
             self.y_hat = undisturbed + self.fits[mode].response(h)
             spread += self.fits[mode].leverage(h)
-        present = np.isfinite(y)
         self.residual = np.where(present, y - self.y_hat, self.residual)
         trusted = self.hold == 0 and distance <= self.settings["leverage_limit"]
         healthy = self._decide(present, trusted=trusted, widening=math.sqrt(spread))
