@@ -66,7 +66,13 @@ def augment(task: Task, mode: dict[str, np.ndarray]) -> Augmented:
         A=np.block([[A, np.zeros((n, r))], [-S @ C, np.eye(r)]]),
         B=np.vstack([B, np.zeros((r, m))]),
         E=np.vstack([E, -S @ F]),
-        H=np.block([[wy * S @ C, np.zeros((r, r))], [np.zeros((r, n)), wz * task.sample_time * np.eye(r)], [np.zeros((m, n + r))]]),
+        H=np.block(
+            [
+                [wy * S @ C, np.zeros((r, r))],
+                [np.zeros((r, n)), wz * task.sample_time * np.eye(r)],
+                [np.zeros((m, n + r))],
+            ]
+        ),
         D=np.vstack([np.zeros((2 * r, m)), wu * np.eye(m)]),
     )
 

@@ -44,15 +44,31 @@ class Mode:
         return self.y0 - self.C @ self.x0
 
 
-def modes(design: dict) -> list[Mode]:
-    """Returns the plant's modes."""
+def _modes(plant: dict) -> list[Mode]:
     return [
         Mode(
             **{key.upper(): np.array(mode[key], dtype=float) for key in "abcef"},
             **{key + "0": np.array(mode["operating_point"][key], dtype=float) for key in "xuy"},
         )
-        for mode in design["controller"]["plant"]["modes"]
+        for mode in plant["modes"]
     ]
+
+
+def modes(design: dict) -> list[Mode]:
+    """Returns the modes that the controller was designed for."""
+    return _modes(design["controller"]["plant"])
+
+
+def true_modes(design: dict) -> list[Mode]:
+    """Returns the modes of the simulated plant, which a scenario may set apart from the design's."""
+    truth = design["truth"]
+    match truth["kind"]:
+        case "as-designed":
+            return modes(design)
+        case "linear":
+            return _modes(truth["plant"])
+        case nonlinear:
+            raise ValueError(nonlinear)
 
 
 def sample_time(design: dict) -> float:

@@ -9,7 +9,7 @@ the inverse of the database's Gram matrix. Equality with the software to roundin
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
@@ -195,12 +195,16 @@ class Loop:
 
     design: dict
     noise: np.ndarray
-    columns: dict[str, list] = field(default_factory=dict)
 
     @cached_property
     def modes(self) -> list[record.Mode]:
-        """The plant's modes."""
+        """The modes as designed for."""
         return record.modes(self.design)
+
+    @cached_property
+    def true_modes(self) -> list[record.Mode]:
+        """The modes of the plant behind the sensors."""
+        return record.true_modes(self.design)
 
     def signals(self, tick: int) -> tuple[int, np.ndarray, np.ndarray, np.ndarray]:
         """Returns mode (0-based), reference, disturbance and additive fault of a tick."""
@@ -241,14 +245,14 @@ class Loop:
         mode = self.signals(0)[0]
         start = self.modes[mode]
         observer.start(mode)
-        sensors = scenario.Sensors(self.design["scenario"]["events"], start.y0.copy())
-        x, u, Z = start.x0, start.u0, np.zeros(len(feedback["tracked"]))
+        sensors = scenario.Sensors(self.design["scenario"]["events"], self.true_modes[mode].y0.copy())
+        x, u, Z = self.true_modes[mode].x0, start.u0, np.zeros(len(feedback["tracked"]))
         estimator.past = [u] * estimator.length
         rows: dict[str, list] = {}
         for tick in range(self.design["scenario"]["steps"]):
             left = mode
             mode, y_ref, w, additive = self.signals(tick)
-            now = self.modes[mode]
+            now = self.true_modes[mode]
             y_true = now.C @ x + now.F @ w + now.c
             y = sensors.read(y_true, self.noise[tick], additive, tick, te)
 
