@@ -2,10 +2,10 @@
 
 mod plants;
 
-use plants::{Channel, paper, paper_spec};
 use ftc::design::state_feedback::synthesise;
 use ftc::design::{DesignError, Lyapunov};
 use ftc::plant::scaling::Scaling;
+use plants::{Channel, paper, paper_spec};
 
 /// Half a unit of the fourth decimal, to which the reference values are given, plus the hair that
 /// is given up for a margin.

@@ -82,6 +82,11 @@ pub enum Advice {
     Tracked(Vec<usize>),
 }
 
+impl Advice {
+    /// Decay rates that are tried when a faster one is infeasible.
+    pub(crate) const DECAYS: [f64; 10] = [0.5, 0.6, 0.7, 0.8, 0.9, 0.95, 0.98, 0.99, 0.995, 0.999];
+}
+
 impl fmt::Display for Advice {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
@@ -182,4 +187,24 @@ pub enum DesignError {
         "the design could not be certified: {0}; scale the plant by nominal values or ask for a slower decay"
     )]
     Uncertified(#[from] super::CertificateError),
+}
+
+/// The verdict on a conflict: blocks by weight, the heaviest first.
+#[cfg(feature = "design")]
+pub(crate) fn infeasible(
+    margin: f64,
+    weights: Vec<(BlockName, f64)>,
+    advice: Vec<Advice>,
+) -> DesignError {
+    let mut blocks: Vec<ConflictingBlock> = weights
+        .into_iter()
+        .filter(|(_, weight)| *weight > 1e-3)
+        .map(|(name, weight)| ConflictingBlock { name, weight })
+        .collect();
+    blocks.sort_by(|x, y| y.weight.total_cmp(&x.weight));
+    DesignError::Infeasible(Infeasibility {
+        margin: margin.min(0.0),
+        blocks,
+        advice,
+    })
 }

@@ -146,6 +146,8 @@ pub fn controller(channel: Channel, noise: f64) -> ControllerParameters {
         feedback: StateFeedback {
             tracked: vec![0, 1],
             latency: 0,
+            resonators: vec![],
+            bumpless: false,
             modes: vec![
                 gains(
                     dmatrix![0.199, -0.827; -1.125, -0.447],

@@ -76,3 +76,56 @@ pub fn paper_spec(latency: usize, decay: f64, lyapunov: Lyapunov) -> ControlSpec
         ..ControlSpec::new(dims)
     }
 }
+
+/// A linear congruential generator: reproducible anywhere, good enough for matrices.
+pub struct Lottery(pub u64);
+
+impl Lottery {
+    /// A number in [-1, 1).
+    pub fn number(&mut self) -> f64 {
+        self.0 = self
+            .0
+            .wrapping_mul(6364136223846793005)
+            .wrapping_add(1442695040888963407);
+        (self.0 >> 11) as f64 / (1u64 << 52) as f64 - 1.0
+    }
+
+    /// A whole number in `low..=high`.
+    pub fn between(&mut self, low: usize, high: usize) -> usize {
+        low + ((self.number() + 1.0) / 2.0 * (high - low + 1) as f64) as usize
+    }
+
+    /// A matrix of numbers in [-1, 1).
+    pub fn matrix(&mut self, rows: usize, columns: usize) -> DMatrix<f64> {
+        DMatrix::from_fn(rows, columns, |_, _| self.number())
+    }
+}
+
+/// A plant of one to three similar modes, sampled from continuous time: `A = I + Te Ac`, where `Ac`
+/// has its spectrum around -2 and may reach into the right half plane.
+pub fn random_plant(seed: u64, sample_time: f64) -> SwitchedPlant {
+    let mut lottery = Lottery(seed.wrapping_mul(0x9E3779B97F4A7C15) + 1);
+    let n = lottery.between(2, 4);
+    let m = lottery.between(1, 3);
+    let p = lottery.between(1, 3);
+    let s = lottery.between(1, p);
+    let modes = lottery.between(1, 3);
+    let (a, b, c) = (
+        2.0 * lottery.matrix(n, n) - 1.5 * DMatrix::identity(n, n),
+        lottery.matrix(n, m),
+        lottery.matrix(p, n),
+    );
+    let e = lottery.matrix(n, s);
+    let modes = (0..modes)
+        .map(|_| {
+            mode(
+                DMatrix::identity(n, n) + sample_time * (&a + 0.2 * lottery.matrix(n, n)),
+                sample_time * (&b + 0.1 * lottery.matrix(n, m)),
+                c.clone(),
+                sample_time * &e,
+                DMatrix::zeros(p, s),
+            )
+        })
+        .collect();
+    SwitchedPlant { sample_time, modes }
+}

@@ -6,15 +6,14 @@
 use super::advice;
 use super::{ModeGains, StateFeedback};
 use crate::design::augmented::{AugmentedMode, augment, scaled};
-use crate::design::certificate::{ControlCertificate, LyapunovMatrix};
-use crate::design::lmi::{Affine, Inequality, Margin, Problem, Variable};
-use crate::design::verdict::{
-    BlockKind, BlockName, ConflictingBlock, DesignError, Infeasibility, SolverFailure,
-};
+use crate::design::certificate::{ControlCertificate, LyapunovMatrix, largest_ratio};
+use crate::design::lmi::{Affine, Inequality, Problem, Variable};
+use crate::design::lyapunov::all_pairs;
+use crate::design::verdict::{BlockKind, BlockName, DesignError, SolverFailure, infeasible};
 use crate::design::{CertificateError, ControlSpec, DwellTime, Lyapunov, Objective, Units};
 use crate::plant::scaling::Scaling;
 use crate::plant::{Dimensions, SwitchedPlant, spectral_radius};
-use nalgebra::{DMatrix, SymmetricEigen};
+use nalgebra::DMatrix;
 
 /// Relative sacrifices of `g = gamma^2` for a margin, tried in turn until the certificate holds.
 const SACRIFICES: [f64; 4] = [2e-5, 1e-4, 1e-3, 1e-2];
@@ -39,11 +38,11 @@ pub fn synthesise(
     let units = Units::choose(plant, spec, scaling);
     let models = augment(plant, spec, &units);
 
-    for group in groups(spec.lyapunov, models.len()) {
+    for group in spec.lyapunov.groups(models.len()) {
         let margin = stability(&models, spec, &group).0.margin()?;
         if margin.margin < SMALLEST_MARGIN {
             let advice = advice::search(plant, spec, scaling);
-            return Err(infeasible(margin, advice));
+            return Err(infeasible(margin.margin, margin.weights, advice));
         }
     }
     let attenuates =
@@ -62,18 +61,10 @@ pub fn synthesise(
 pub(super) fn is_feasible(plant: &SwitchedPlant, spec: &ControlSpec, scaling: &Scaling) -> bool {
     let units = Units::choose(plant, spec, scaling);
     let models = augment(plant, spec, &units);
-    groups(spec.lyapunov, models.len()).iter().all(|group| {
+    spec.lyapunov.groups(models.len()).iter().all(|group| {
         let margin = stability(&models, spec, group).0.margin();
         margin.is_ok_and(|found| found.margin > 1e3 * SMALLEST_MARGIN)
     })
-}
-
-/// Modes that share a problem: each alone under `dwell`, else all together.
-fn groups(lyapunov: Lyapunov, modes: usize) -> Vec<Vec<usize>> {
-    match lyapunov {
-        Lyapunov::Dwell => (0..modes).map(|mode| vec![mode]).collect(),
-        Lyapunov::Common | Lyapunov::Switched => vec![(0..modes).collect()],
-    }
 }
 
 /// The unknowns of one mode: `S`, `G + G' - S` as an expression, `G` and `R = K~ G`.
@@ -128,11 +119,6 @@ fn unknowns(
         .collect()
 }
 
-/// Pairs of positions within a group whose inequalities must hold.
-fn pairs(lyapunov: Lyapunov, group: &[usize]) -> Vec<(usize, usize)> {
-    lyapunov.pairs(group.len())
-}
-
 /// `A G + B R`.
 fn next_state(model: &AugmentedMode, unknowns: &ModeUnknowns) -> Affine {
     &model.a * &unknowns.slack + &model.b * &unknowns.feedback
@@ -146,7 +132,7 @@ fn require_decay(
     group: &[usize],
     unknowns: &[ModeUnknowns],
 ) {
-    for (i, j) in pairs(spec.lyapunov, group) {
+    for (i, j) in spec.lyapunov.pairs(group.len()) {
         let name = BlockName::new(BlockKind::Decay, group[i], group[j]);
         let own = spec.decay.powi(2) * unknowns[i].own(spec.lyapunov);
         let next = next_state(&models[group[i]], &unknowns[i]);
@@ -169,7 +155,7 @@ fn require_attenuation(
     unknowns: &[ModeUnknowns],
     level: &Affine,
 ) {
-    for (i, j) in pairs(lyapunov, group) {
+    for (i, j) in lyapunov.pairs(group.len()) {
         let model = &models[group[i]];
         let name = BlockName::new(BlockKind::Attenuation, group[i], group[j]);
         let performance = &model.h * &unknowns[i].slack + &model.d * &unknowns[i].feedback;
@@ -228,7 +214,7 @@ fn each_group(
     mut solve: impl FnMut(&[usize]) -> Result<Vec<Part>, SolverFailure>,
 ) -> Result<Vec<Part>, DesignError> {
     let mut parts = Vec::new();
-    for group in groups(spec.lyapunov, models.len()) {
+    for group in spec.lyapunov.groups(models.len()) {
         parts.extend(solve(&group)?);
     }
     parts.sort_by_key(|part| part.mode);
@@ -324,7 +310,7 @@ fn attenuate(
     models: &[AugmentedMode],
 ) -> Result<StateFeedback, DesignError> {
     let mut least = vec![0.0; models.len()];
-    for group in groups(spec.lyapunov, models.len()) {
+    for group in spec.lyapunov.groups(models.len()) {
         let level = least_level(models, spec, &group)?.max(f64::MIN_POSITIVE);
         group.iter().for_each(|&mode| least[mode] = level);
     }
@@ -416,45 +402,19 @@ fn physical_gains(gain: &DMatrix<f64>, units: &Units, latency: usize) -> ModeGai
 
 /// The dwell time that the factor between the Lyapunov matrices asks for, with `mu` a hair above
 /// its computed value so that it can be proved.
-pub(crate) fn dwell_time(
+fn dwell_time(
     matrices: &[DMatrix<f64>],
     decay: f64,
     sample_time: f64,
 ) -> Result<DwellTime, DesignError> {
     let mut mu = 1.0_f64;
-    for (i, own) in matrices.iter().enumerate() {
-        for (j, next) in matrices.iter().enumerate().filter(|(j, _)| *j != i) {
-            let factor = next.clone().cholesky().ok_or_else(|| {
+    for (i, j) in all_pairs(matrices.len()) {
+        if i != j {
+            let ratio = largest_ratio(&matrices[i], &matrices[j]).ok_or_else(|| {
                 CertificateError::Unproved(BlockName::new(BlockKind::Lyapunov, j, j))
             })?;
-            let half = factor
-                .l()
-                .solve_lower_triangular(own)
-                .ok_or(SolverFailure::NumericalTrouble)?;
-            let ratio = factor
-                .l()
-                .solve_lower_triangular(&half.transpose())
-                .ok_or(SolverFailure::NumericalTrouble)?;
-            let symmetric = 0.5 * (&ratio + ratio.transpose());
-            mu = mu.max(SymmetricEigen::new(symmetric).eigenvalues.max());
-            debug_assert!(i != j);
+            mu = mu.max(ratio);
         }
     }
     Ok(DwellTime::new(mu * (1.0 + 1e-9), decay, sample_time))
-}
-
-/// The verdict on a conflict: blocks by weight, the heaviest first.
-pub(crate) fn infeasible(margin: Margin, advice: Vec<crate::design::Advice>) -> DesignError {
-    let mut blocks: Vec<ConflictingBlock> = margin
-        .weights
-        .into_iter()
-        .filter(|(_, weight)| *weight > 1e-3)
-        .map(|(name, weight)| ConflictingBlock { name, weight })
-        .collect();
-    blocks.sort_by(|x, y| y.weight.total_cmp(&x.weight));
-    DesignError::Infeasible(Infeasibility {
-        margin: margin.margin.min(0.0),
-        blocks,
-        advice,
-    })
 }
