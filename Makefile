@@ -4,7 +4,6 @@
 PYTHON ?= python3
 VENV := .venv
 IN_VENV := $(VENV)/bin/
-FTC_FMU := target/release/ftc-fmu
 
 .PHONY: build test test-rust test-python demo bench lint clean
 
@@ -22,7 +21,7 @@ test-python: build $(VENV)/ready
 	$(IN_VENV)python -m pytest
 
 demo: build $(VENV)/ready
-	$(IN_VENV)python tools/demo/demo.py $(FTC_FMU) examples/paper.toml out/demo
+	PYTHONPATH=tests/support $(IN_VENV)python tests/fmpy/demo.py examples/paper.toml out/demo
 
 bench: build
 	cargo bench --workspace

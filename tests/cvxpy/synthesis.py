@@ -135,3 +135,9 @@ def attenuation(task: Task) -> list[float]:
     if task.lyapunov == "common":
         return [_least_gain(models, task.decay)] * len(models)
     return [_least_gain([model], task.decay) for model in models]
+
+
+def closed_loop(model: Augmented, gain: np.ndarray) -> Augmented:
+    """Returns the model under u = gain X: no input is left."""
+    none = np.zeros((len(model.A), 0)), np.zeros((len(model.H), 0))
+    return Augmented(model.A + model.B @ gain, none[0], model.E, model.H + model.D @ gain, none[1])

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 import pytest
+from numpy.lib.stride_tricks import sliding_window_view
 
 import commands
 import design_file
@@ -27,8 +28,9 @@ def _run(folder: Path, disturbed: str, reference: str, noise: float) -> commands
 
 
 def _recently(happening: np.ndarray, samples: int) -> np.ndarray:
-    """Says of each sample whether `happening` was true in it or in the `samples` before it."""
-    return np.logical_or.reduce([np.roll(happening, k, axis=0) for k in range(samples + 1)])
+    """Says of each sample whether `happening` was true in it or in one of the `samples` before it."""
+    before = np.zeros((samples, happening.shape[1]), dtype=bool)
+    return sliding_window_view(np.vstack([before, happening]), samples + 1, axis=0).any(axis=-1)
 
 
 @pytest.mark.parametrize(("disturbed", "reference", "noise"), RUNS)

@@ -13,6 +13,7 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
+from scipy.linalg import block_diag
 
 import record
 import scenario
@@ -189,6 +190,21 @@ class Observer:
         self.prior = now.A @ self.x_hat + now.B @ u + now.a
 
 
+class InternalModel:
+    """Integrators of the tracking error and resonators beside them: Z+ = M Z + N Te e."""
+
+    def __init__(self, design: dict) -> None:
+        """Forms M and N: one integrator per tracked output, then one rotation per resonator and output."""
+        feedback = design["controller"]["feedback"]
+        r = len(feedback["tracked"])
+        turns = [
+            np.array([[math.cos(angle), -math.sin(angle)], [math.sin(angle), math.cos(angle)]])
+            for angle in feedback["resonators"]
+        ]
+        self.M = block_diag(np.eye(r), *(np.kron(np.eye(r), turn) for turn in turns))
+        self.N = np.vstack([np.eye(r), *(np.kron(np.eye(r), [[1.0], [0.0]]) for _ in turns)])
+
+
 @dataclass
 class Loop:
     """The closed loop of a design record, controller first and then plant."""
@@ -246,7 +262,8 @@ class Loop:
         start = self.modes[mode]
         observer.start(mode)
         sensors = scenario.Sensors(self.design["scenario"]["events"], self.true_modes[mode].y0.copy())
-        x, u, Z = self.true_modes[mode].x0, start.u0, np.zeros(len(feedback["tracked"]))
+        internal = InternalModel(self.design)
+        x, u, Z = self.true_modes[mode].x0, start.u0, np.zeros(len(internal.M))
         estimator.past = [u] * estimator.length
         rows: dict[str, list] = {}
         for tick in range(self.design["scenario"]["steps"]):
@@ -261,12 +278,15 @@ class Loop:
             fault = self.trusted_fault(variant, estimator.f_hat, sensors.fault)
             y_c = np.where(np.isfinite(y), y - fault, substitute)
             observer.correct(mode, y_c)
+            if mode != left and feedback["bumpless"]:
+                G = np.array(feedback["modes"][mode]["integral"])
+                Z = Z + np.linalg.pinv(G) @ (u - self.command(mode, observer.x_hat, Z, u))
             wanted = self.command(mode, observer.x_hat, Z, u)
             u_old, u = u, self.saturate(wanted)
             acting = u_old if feedback["latency"] else u
 
             unwinding = np.array(feedback["modes"][mode]["anti_windup"])
-            Z = Z + te * (y_ref - y_c[feedback["tracked"]]) + unwinding @ (u - wanted)
+            Z = internal.M @ Z + internal.N @ (te * (y_ref - y_c[feedback["tracked"]])) + unwinding @ (u - wanted)
             observer.advance(mode, acting, y_c)
             estimator.past.append(acting)
             for name, value in {
