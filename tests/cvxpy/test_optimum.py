@@ -59,8 +59,8 @@ def _design(task: synthesis.Task, folder: Path) -> dict:
         "estimator": {"method": "none"},
         "compensation": {"method": "none"},
     }
-    # An infeasible design is answered on standard output too, with exit code 2.
-    return json.loads(commands.ftc_fmu("design", design_file.write(request, folder), "--json", accept=(0, 2)))
+    # An infeasible design is answered on standard output too, with exit code 1.
+    return json.loads(commands.ftc_fmu("design", design_file.write(request, folder), "--json", accept=(0, 1)))
 
 
 @pytest.mark.parametrize("seed", SEEDS)
