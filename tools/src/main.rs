@@ -1,2 +1,5 @@
 //! Command line.
+#[allow(dead_code)]
+mod report;
+
 fn main() {}
