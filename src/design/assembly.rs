@@ -1,9 +1,10 @@
 //! From what is asked for to a finished design: gains, observer, predictor, thresholds, record.
 
 use super::commissioning::{self, LONGEST_RESPONSE};
+use super::harmonics;
 use super::{
     ControlSpec, Design, DesignError, FORMAT, ObserverSpec, Signal, Signals, check_controllable,
-    disturbance_response, synthesise,
+    synthesise,
 };
 use crate::control::ControllerParameters;
 use crate::control::parameters::{
@@ -49,6 +50,8 @@ pub struct EstimatorSpec {
     pub threshold: Threshold,
     /// Consecutive samples that raise or release a fault.
     pub debounce: u32,
+    /// Whether the response goes on being learned while all is well.
+    pub adapt: bool,
     /// The periodic disturbance to be learned on line.
     pub disturbance: Option<KnownDisturbance>,
 }
@@ -196,13 +199,18 @@ fn estimator(request: &Request, dims: Dimensions) -> Result<Estimator, String> {
     let harmonics = spec
         .disturbance
         .as_ref()
-        .map(|known| harmonics(known, spec, &request.plant, &thresholds));
+        .map(|known| known_harmonics(known, spec, &request.plant, &thresholds));
+    let harmonic_transfers = harmonics.as_ref().map_or_else(Vec::new, |known| {
+        harmonics::transfers(&request.plant, known.period, known.count)
+    });
     Ok(Estimator {
         method: spec.method,
         response_length,
         window: dims.inputs * (response_length + 1) + WINDOW_MARGIN,
         predictors,
+        adapt: spec.adapt,
         harmonics,
+        harmonic_transfers,
         thresholds,
         debounce: spec.debounce,
         leverage_limit: LEVERAGE_LIMIT,
@@ -295,7 +303,7 @@ fn thresholds(
 
 /// What the estimator is told of the disturbance. A known amplitude bounds its response, so that
 /// the thresholds need not be opened wider than that response while it is being learned.
-fn harmonics(
+fn known_harmonics(
     known: &KnownDisturbance,
     spec: &EstimatorSpec,
     plant: &SwitchedPlant,
@@ -307,7 +315,7 @@ fn harmonics(
         Threshold::Given(_) => USUAL_SIGMAS,
     };
     let variance = known.amplitude.as_ref().map(|amplitude| {
-        let response = disturbance_response(plant, period, known.harmonics, amplitude);
+        let response = harmonics::largest_response(plant, period, known.harmonics, amplitude);
         let deviations = response.iter().zip(thresholds).map(|(r, t)| sigmas * r / t);
         deviations.fold(0.0, f64::max).powi(2)
     });

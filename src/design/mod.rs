@@ -8,7 +8,7 @@ pub mod augmented;
 pub mod certificate;
 pub mod commissioning;
 mod controllability;
-mod frequency;
+pub mod harmonics;
 #[cfg(feature = "design")]
 pub mod lmi;
 mod lyapunov;
@@ -27,7 +27,6 @@ use serde::{Deserialize, Serialize};
 
 pub use certificate::{CertificateError, ControlCertificate};
 pub use controllability::check_controllable;
-pub use frequency::disturbance_response;
 pub use lyapunov::{DwellTime, Lyapunov};
 pub use observer::{ObserverCertificate, ObserverDesign};
 pub use record::{Design, FORMAT, Signal, Signals};

@@ -469,6 +469,7 @@ fn estimator(
         database: database(given)?,
         threshold: threshold(given, dims)?,
         debounce,
+        adapt: given.adapt.unwrap_or(defaults::ADAPT),
         disturbance,
     })
 }

@@ -1,8 +1,7 @@
 //! `export`: zips prebuilt generic binaries with the design as their resource. Nothing is compiled.
 
-use crate::interface::interface;
 use crate::output::Staging;
-use crate::report;
+use crate::summary;
 use ftc::design::Design;
 use model_description::xml::{self, Document};
 use model_description::{CONTROLLER, Interface, PLANT, VariableTable};
@@ -81,14 +80,14 @@ type Contents = BTreeMap<String, Vec<u8>>;
 ///
 /// # Errors
 /// One sentence: no certificate, no binaries, or the output directory.
-pub fn write(design: &Design, mut staging: Staging) -> Result<String, String> {
+pub fn write(design: &Design, staging: Staging) -> Result<String, String> {
     prove(design)?;
     let folder = std::env::current_exe()
         .ok()
         .and_then(|program| program.parent().map(Path::to_path_buf))
         .ok_or("cannot find the directory of this program: start it by its full path")?;
     let resource = serde_json::to_vec(design).map_err(|error| error.to_string())?;
-    let interface = interface(design);
+    let interface = Interface::from(design);
     let mut packed = Vec::new();
     for kind in &KINDS {
         let identifier = format!("{}_{}", design.name, kind.suffix);
@@ -208,7 +207,7 @@ fn zip(contents: &Contents) -> zip::result::ZipResult<Vec<u8>> {
 /// A page with the design report.
 fn documentation(design: &Design, kind: &Kind) -> String {
     let mut body = String::new();
-    for (title, lines) in report::sections(design) {
+    for (title, lines) in summary::sections(design) {
         let _ = writeln!(body, "<h2>{title}</h2>\n<table>");
         for (name, value) in lines {
             let _ = writeln!(

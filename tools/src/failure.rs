@@ -1,6 +1,6 @@
 //! Why a command ends without success, and with which exit code.
 
-use crate::report;
+use crate::summary;
 use ftc::design::{ControlSpec, DesignError};
 use std::fmt;
 use std::path::Path;
@@ -45,7 +45,7 @@ impl Failure {
             Self::NoDesign {
                 file, asked, error, ..
             } => Self::NoDesign {
-                output: Some(report::json_of_failure(&asked, &error)),
+                output: Some(summary::json_of_failure(&asked, &error)),
                 file,
                 asked,
                 error,

@@ -10,11 +10,11 @@ mod assemble;
 mod design_file;
 mod export;
 mod failure;
-mod interface;
 mod output;
 mod progress;
 mod report;
 mod simulate;
+mod summary;
 
 use clap::{Parser, Subcommand};
 use failure::Failure;
@@ -71,7 +71,7 @@ enum Command {
         #[arg(long, value_name = "DIR")]
         out: PathBuf,
     },
-    /// Run the design's scenario without any FMU: trajectories.csv and metrics.json.
+    /// Run the design's scenario without any FMU: trajectories.csv, metrics.json, report.html and figures.
     ///
     /// Runs it three times: with fault tolerance (ftc), with the same gains believing every
     /// sensor (no_ftc), and with the same gains told the true fault (told_the_fault), which no
@@ -112,9 +112,9 @@ fn run(arguments: &Arguments) -> Result<String, Failure> {
         Command::Design {
             design,
             json: false,
-        } => Ok(report::text(&solve(design, &progress)?)),
+        } => Ok(summary::text(&solve(design, &progress)?)),
         Command::Design { design, json: true } => match solve(design, &progress) {
-            Ok(design) => Ok(report::json(&design)),
+            Ok(design) => Ok(summary::json(&design)),
             Err(failure) => Err(failure.explained_in_json()),
         },
         Command::Export { design, out } => {

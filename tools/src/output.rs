@@ -9,10 +9,9 @@ use tempfile::TempDir;
 /// together; dropped before that, it leaves nothing behind.
 pub struct Staging {
     out: PathBuf,
-    temporary: Option<TempDir>,
+    temporary: TempDir,
     /// Directories that were made for the output, innermost first.
     made: Vec<PathBuf>,
-    names: Vec<String>,
 }
 
 impl Staging {
@@ -28,66 +27,85 @@ impl Staging {
             ));
         }
         let ancestors = out.ancestors().filter(|path| !path.as_os_str().is_empty());
-        let made = ancestors
+        let made: Vec<PathBuf> = ancestors
             .take_while(|path| !path.exists())
             .map(Path::to_path_buf)
             .collect();
-        let mut staging = Self {
+        let temporary = fs::create_dir_all(out)
+            .and_then(|()| tempfile::Builder::new().prefix(".ftc-fmu-").tempdir_in(out))
+            .map_err(|error| {
+                remove(&made);
+                blame(out, &error)
+            })?;
+        Ok(Self {
             out: out.to_path_buf(),
-            temporary: None,
+            temporary,
             made,
-            names: Vec::new(),
-        };
-        let hidden = fs::create_dir_all(out)
-            .and_then(|()| tempfile::Builder::new().prefix(".ftc-fmu-").tempdir_in(out));
-        staging.temporary = Some(hidden.map_err(|error| staging.blame(&error))?);
-        Ok(staging)
+        })
+    }
+
+    /// Where files are collected.
+    pub fn folder(&self) -> &Path {
+        self.temporary.path()
+    }
+
+    /// Where a file will be once all are moved into place.
+    pub fn target(&self, name: &str) -> PathBuf {
+        self.out.join(name)
     }
 
     /// Adds a file.
     ///
     /// # Errors
     /// One sentence that names the directory.
-    pub fn add(&mut self, name: &str, bytes: &[u8]) -> Result<(), String> {
-        let Some(temporary) = &self.temporary else {
-            return Ok(());
-        };
-        fs::write(temporary.path().join(name), bytes).map_err(|error| self.blame(&error))?;
-        self.names.push(name.to_string());
-        Ok(())
+    pub fn add(&self, name: &str, bytes: &[u8]) -> Result<(), String> {
+        fs::write(self.folder().join(name), bytes).map_err(|error| blame(&self.out, &error))
     }
 
-    /// Moves every file into place and returns their paths.
+    /// Moves every file into place and returns their paths in alphabetical order.
     ///
     /// # Errors
     /// One sentence that names the directory.
     pub fn commit(mut self) -> Result<Vec<PathBuf>, String> {
-        let mut paths = Vec::new();
-        if let Some(temporary) = &self.temporary {
-            for name in &self.names {
-                let path = self.out.join(name);
-                fs::rename(temporary.path().join(name), &path)
-                    .map_err(|error| self.blame(&error))?;
-                paths.push(path);
-            }
-        }
+        let paths = self.move_files().map_err(|error| blame(&self.out, &error))?;
         self.made.clear();
         Ok(paths)
     }
 
-    fn blame(&self, error: &io::Error) -> String {
-        format!(
-            "--out {}: cannot be written to ({error}): name a directory you may write to",
-            self.out.display()
-        )
+    fn move_files(&self) -> io::Result<Vec<PathBuf>> {
+        let mut names = Vec::new();
+        for entry in fs::read_dir(self.folder())? {
+            names.push(entry?.file_name());
+        }
+        names.sort();
+        let mut paths = Vec::new();
+        for name in names {
+            let path = self.out.join(&name);
+            fs::rename(self.folder().join(&name), &path)?;
+            paths.push(path);
+        }
+        Ok(paths)
     }
+}
+
+fn blame(out: &Path, error: &io::Error) -> String {
+    format!(
+        "--out {}: cannot be written to ({error}): name a directory you may write to",
+        out.display()
+    )
 }
 
 impl Drop for Staging {
     fn drop(&mut self) {
-        drop(self.temporary.take());
-        for path in &self.made {
-            fs::remove_dir(path).ok();
-        }
+        // The temporary directory goes first: only empty directories are removed.
+        fs::remove_dir_all(self.folder()).ok();
+        remove(&self.made);
+    }
+}
+
+/// Removes directories that are empty, innermost first.
+fn remove(directories: &[PathBuf]) {
+    for path in directories {
+        fs::remove_dir(path).ok();
     }
 }

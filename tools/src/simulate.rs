@@ -1,6 +1,7 @@
 //! `simulate`: every variant of the loop natively, written down sample by sample.
 
 use crate::output::Staging;
+use crate::report;
 use ftc::control::Controller;
 use ftc::design::Design;
 use ftc::simulate::closed_loop::{Merits, Record};
@@ -12,16 +13,17 @@ use std::fmt::Write;
 ///
 /// # Errors
 /// One sentence about the output directory.
-pub fn write(design: &Design, mut staging: Staging) -> Result<String, String> {
+pub fn write(design: &Design, staging: Staging) -> Result<String, String> {
+    let report = staging.target("report.html");
     let trajectories = trajectories(design);
     let csv = table(design, &trajectories).map_err(|error| error.to_string())?;
     staging.add("trajectories.csv", &csv)?;
     staging.add("metrics.json", metrics(design, &trajectories).as_bytes())?;
-    let paths = staging.commit()?;
+    report::write(design, &trajectories, &staging.folder().join("report.html"))
+        .map_err(|error| format!("{error:#}"))?;
+    staging.commit()?;
     let mut text = summary(design, &trajectories);
-    for path in paths {
-        let _ = writeln!(text, "wrote {}", path.display());
-    }
+    let _ = writeln!(text, "wrote {}, trajectories.csv, metrics.json and the figures", report.display());
     Ok(text)
 }
 

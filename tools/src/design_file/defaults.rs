@@ -52,6 +52,8 @@ pub const DATABASE: &str = "commission";
 pub const SIGMAS: f64 = 6.0;
 /// `estimator.debounce`
 pub const DEBOUNCE: u32 = 1;
+/// `estimator.adapt`
+pub const ADAPT: bool = false;
 /// `compensation.method`
 pub const COMPENSATION: CompensationMethod = CompensationMethod::VirtualSensor;
 /// `scenario.steps`

@@ -192,6 +192,8 @@ pub struct Estimator {
     pub sigmas: Option<f64>,
     /// Consecutive samples that raise or release a fault.
     pub debounce: Option<i64>,
+    /// Whether the response goes on being learned while all is well.
+    pub adapt: Option<bool>,
 }
 
 /// Values of `estimator.method`.
