@@ -132,6 +132,9 @@ pub struct Estimator {
     pub window: usize,
     /// The predictor of each mode; none for the other methods.
     pub predictors: Vec<Predictor>,
+    /// Whether the response goes on being learned while all is well.
+    #[serde(default)]
+    pub adapt: bool,
     /// The periodic disturbance whose response is learned on line.
     pub harmonics: Option<Harmonics>,
     /// What a response learned in one mode tells of another, `[from][to][harmonic]`; may be empty.

@@ -174,6 +174,7 @@ pub fn controller(channel: Channel, noise: f64) -> ControllerParameters {
             response_length: length,
             window: 2 * (length + 1) + 20,
             predictors,
+            adapt: false,
             harmonics: Some(Harmonics {
                 period: core::f64::consts::TAU / 0.02,
                 count: 1,

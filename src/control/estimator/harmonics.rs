@@ -85,6 +85,11 @@ impl HarmonicState {
         self.samples >= SAMPLES_PER_COEFFICIENT * self.regressor.len() as u64
     }
 
+    /// Whether a whole period has been learned from.
+    pub fn is_settled(&self, harmonics: &Harmonics) -> bool {
+        self.samples as f64 >= harmonics.period
+    }
+
     /// Starts from what `other` learned in another mode; `deviations` (p) are the sensors' noise levels.
     pub fn carry_over(
         &mut self,

@@ -6,11 +6,13 @@
 //! is judged against its own threshold ([`decision`]), widened by how far the present input lies
 //! from those the database knows.
 
+mod adaptation;
 mod decision;
 mod harmonics;
 mod predictor;
 mod window;
 
+pub use adaptation::Adaptation;
 pub use decision::{Decision, Verdict};
 pub use harmonics::HarmonicState;
 pub use predictor::{InputHistory, leverage};
@@ -49,6 +51,8 @@ pub struct EstimatorState {
     hold: usize,
     /// Per mode: the learned response to the periodic disturbance.
     harmonics: Vec<HarmonicState>,
+    /// Per mode: the adapted response; empty unless adaptation is on.
+    adaptations: Vec<Adaptation>,
     decisions: Vec<Decision>,
     /// The window of the printed method, where it is chosen.
     window: Option<SlidingWindow>,
@@ -78,6 +82,11 @@ impl EstimatorState {
             history: InputHistory::new(inputs, estimator.response_length),
             hold: estimator.response_length,
             harmonics,
+            adaptations: if estimator.adapt {
+                estimator.predictors.iter().map(Adaptation::new).collect()
+            } else {
+                Vec::new()
+            },
             window: (estimator.method == EstimatorMethod::Sliding).then(|| {
                 SlidingWindow::new(
                     inputs.len() * estimator.response_length,
@@ -136,11 +145,8 @@ impl EstimatorState {
             EstimatorMethod::None => None,
         };
         let healthy = self.decide(estimator, seen, widening);
-        if healthy
-            && let Some(learned) = self.harmonics.get_mut(seen.mode)
-            && let Some(known) = &estimator.harmonics
-        {
-            learned.learn(known, &self.residual);
+        if healthy {
+            self.learn(estimator, seen.mode);
         }
         self.hold = self.hold.saturating_sub(1);
     }
@@ -155,6 +161,9 @@ impl EstimatorState {
             &predictor.response,
             self.history.regressor(),
         );
+        if let Some(adaptation) = self.adaptations.get_mut(seen.mode) {
+            adaptation.improve(self.history.regressor(), &mut self.prediction);
+        }
         let leverage = self.history.leverage(&predictor.factor);
         let mut spread = 1.0 + leverage;
         if let Some(learned) = self.harmonics.get_mut(seen.mode)
@@ -175,6 +184,24 @@ impl EstimatorState {
         let uncertain = spread > 1.0 + estimator.leverage_limit && self.flagged.contains(&true);
         let trusted = self.hold == 0 && leverage <= estimator.leverage_limit && !uncertain;
         trusted.then(|| libm::sqrt(spread))
+    }
+
+    /// Takes a healthy sample in: the response to the disturbance first, the plant's own response
+    /// only once the former is known, since the loop's input follows the disturbance too.
+    fn learn(&mut self, estimator: &Estimator, mode: usize) {
+        let mut settled = true;
+        if let Some(learned) = self.harmonics.get_mut(mode)
+            && let Some(known) = &estimator.harmonics
+        {
+            settled = learned.is_settled(known);
+            learned.learn(known, &self.residual);
+        }
+        if settled
+            && let Some(adaptation) = self.adaptations.get_mut(mode)
+            && let Some(predictor) = estimator.predictors.get(mode)
+        {
+            adaptation.learn(predictor, self.history.regressor(), &self.residual);
+        }
     }
 
     /// The sliding window as printed: leaves the residual; nothing until the window is full.
