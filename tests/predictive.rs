@@ -22,6 +22,7 @@ fn spec(limit: f64) -> PredictiveSpec {
             2
         ],
         noise: vec![0.01; 2],
+        disturbance: vec![0.04],
         horizon: 20,
     }
 }

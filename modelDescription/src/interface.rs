@@ -12,7 +12,7 @@ use crate::{Causality, Kind, Role, Span, Variability, Variable, VariableTable};
 /// What the user says about a signal.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct SignalInfo {
-    /// The user's name; empty for the default `y[1]`.
+    /// The user's name; empty for the default (`u[1]`, `y[1]`, `x[1]`).
     pub name: String,
     /// Unit; empty for a pure number.
     pub unit: String,
@@ -54,13 +54,10 @@ pub struct Interface {
 /// Inputs `y`, `y_ref`, `mode`, `mode_real`; outputs `u`, `x_hat`, `f_hat`, `residual`, `fault`;
 /// tunable parameters `ftc_enabled`, `threshold`.
 pub fn controller(interface: &Interface) -> VariableTable {
-    let Interface {
-        inputs,
-        outputs,
-        states,
-        ..
-    } = interface;
-    let references: Vec<SignalInfo> = interface.references();
+    let inputs = &named("u", &interface.inputs);
+    let outputs = &named("y", &interface.outputs);
+    let states = &named("x", &interface.states);
+    let references = interface.references(outputs);
     let mut table = VariableTable::new();
 
     let input = Maker::input();
@@ -101,7 +98,7 @@ pub fn controller(interface: &Interface) -> VariableTable {
     table.extend(outputs.iter().enumerate().map(|(at, signal)| {
         output.boolean(
             format!("fault[{}]", at + 1),
-            describe("Sensor fault flagged on", signal, "y", at),
+            format!("Sensor fault flagged on {}", signal.name),
             Role::FaultFlag,
             false,
         )
@@ -133,6 +130,7 @@ pub fn controller(interface: &Interface) -> VariableTable {
     ));
 
     let modes = vec![scalar(mode), scalar(real)];
+    // Before the first tick nothing is computed but the operating point of the active mode.
     for role in [Role::Command, Role::StateEstimate] {
         table.depend(role, |_| modes.clone());
     }
@@ -145,14 +143,11 @@ pub fn controller(interface: &Interface) -> VariableTable {
 /// scenario's `y_ref`, `mode`, `mode_real`, `f`, `w`; fixed parameters `scenario_enabled`,
 /// `noise_enabled`.
 pub fn plant(interface: &Interface) -> VariableTable {
-    let Interface {
-        inputs,
-        outputs,
-        states,
-        ..
-    } = interface;
-    let references = interface.references();
-    let disturbances = vec![SignalInfo::default(); interface.disturbances];
+    let inputs = &named("u", &interface.inputs);
+    let outputs = &named("y", &interface.outputs);
+    let states = &named("x", &interface.states);
+    let references = interface.references(outputs);
+    let disturbances = named("w", &vec![SignalInfo::default(); interface.disturbances]);
     let faults = deviations(outputs);
     let mut table = VariableTable::new();
 
@@ -234,21 +229,23 @@ pub fn plant(interface: &Interface) -> VariableTable {
 }
 
 impl Interface {
-    /// The tracked outputs.
-    fn references(&self) -> Vec<SignalInfo> {
-        self.tracked
-            .iter()
-            .map(|&at| {
-                let signal = self.outputs.get(at).cloned().unwrap_or_default();
-                let name = if signal.name.is_empty() {
-                    format!("y[{}]", at + 1)
-                } else {
-                    signal.name
-                };
-                SignalInfo { name, ..signal }
-            })
-            .collect()
+    /// The tracked ones among the outputs; a position that is none is left out.
+    fn references(&self, outputs: &[SignalInfo]) -> Vec<SignalInfo> {
+        let tracked = self.tracked.iter();
+        tracked.filter_map(|&at| outputs.get(at).cloned()).collect()
     }
+}
+
+/// The same signals, those without a name called `y[1]`, `y[2]` ... by their position.
+fn named(base: &str, signals: &[SignalInfo]) -> Vec<SignalInfo> {
+    let name = |(at, signal): (usize, &SignalInfo)| {
+        let mut signal = signal.clone();
+        if signal.name.is_empty() {
+            signal.name = format!("{base}[{}]", at + 1);
+        }
+        signal
+    };
+    signals.iter().enumerate().map(name).collect()
 }
 
 /// The same signals as differences: unit and magnitude remain, range and operating point go.
@@ -268,14 +265,6 @@ fn scalar(reference: u32) -> Span {
     Span {
         first: reference,
         len: 1,
-    }
-}
-
-fn describe(what: &str, signal: &SignalInfo, base: &str, at: usize) -> String {
-    if signal.name.is_empty() {
-        format!("{what} {base}[{}]", at + 1)
-    } else {
-        format!("{what} {}", signal.name)
     }
 }
 
@@ -360,7 +349,8 @@ impl Maker {
                 .max(min.unwrap_or(f64::NEG_INFINITY))
                 .min(max.unwrap_or(f64::INFINITY));
             let name = format!("{base}[{}]", at + 1);
-            self.variable(name, describe(what, signal, base, at), kind, role, start)
+            let description = format!("{what} {}", signal.name);
+            self.variable(name, description, kind, role, start)
         };
         signals.iter().enumerate().map(make).collect()
     }

@@ -1,6 +1,7 @@
 //! The controller's and the plant's tables, for designs of many sizes.
 
 use model_description::*;
+use proptest::prelude::*;
 
 fn signal(name: &str, unit: &str, range: Option<(f64, f64)>) -> SignalInfo {
     SignalInfo {
@@ -62,6 +63,26 @@ fn every_table_makes_sense() {
     for design in designs() {
         assert_eq!(controller(&design).check(), Ok(()));
         assert_eq!(plant(&design).check(), Ok(()));
+    }
+}
+
+proptest! {
+    #[test]
+    fn tables_of_any_size_make_sense(
+        sizes in (1..15usize, 1..6usize, 1..6usize, 0..6usize, 0..4usize, 1..9usize),
+        bounds in prop::collection::vec((-1e6..1e6f64, 0.0..1e6f64, -1e9..1e9f64), 6),
+    ) {
+        let (n, m, p, r, s, modes) = sizes;
+        let mut design = sized([n, m, p, r.min(p), s, modes]);
+        let signals = design.inputs.iter_mut().chain(&mut design.outputs);
+        for (signal, (min, width, start)) in signals.zip(bounds) {
+            (signal.min, signal.max, signal.start) = (Some(min), Some(min + width), start);
+        }
+        for table in [controller(&design), plant(&design)] {
+            prop_assert_eq!(table.check(), Ok(()));
+            let vectors: u32 = ["u", "y", "y_ref"].map(|base| table.vector(base).len).iter().sum();
+            prop_assert_eq!(vectors as usize, m + p + r.min(p));
+        }
     }
 }
 

@@ -150,7 +150,7 @@ impl Controller {
             return;
         };
         let point = &described.operating_point;
-        let left = self.enter(state, mode);
+        let left = self.enter(state, mode, sample.thresholds);
         state.estimator.observe(
             &self.parameters.estimator,
             &Observation {
@@ -178,10 +178,12 @@ impl Controller {
     }
 
     /// Notes the mode and returns the one just left.
-    fn enter(&self, state: &mut ControllerState, mode: usize) -> usize {
+    fn enter(&self, state: &mut ControllerState, mode: usize, thresholds: &[f64]) -> usize {
         let left = state.mode.replace(mode).unwrap_or(mode);
         if left != mode {
-            state.estimator.mode_entered(&self.parameters.estimator);
+            state
+                .estimator
+                .mode_entered(&self.parameters.estimator, left, mode, thresholds);
         }
         left
     }

@@ -132,8 +132,14 @@ pub struct Estimator {
     pub window: usize,
     /// The predictor of each mode; none for the other methods.
     pub predictors: Vec<Predictor>,
+    /// Whether the response goes on being learned while all is well.
+    #[serde(default)]
+    pub adapt: bool,
     /// The periodic disturbance whose response is learned on line.
     pub harmonics: Option<Harmonics>,
+    /// What a response learned in one mode tells of another, `[from][to][harmonic]`; may be empty.
+    #[serde(default)]
+    pub harmonic_transfers: Vec<Vec<Vec<PhasorMap>>>,
     /// Decision threshold per sensor (p), in output units, before widening by the leverage.
     pub thresholds: Vec<f64>,
     /// Consecutive samples needed to raise or release a fault.
@@ -170,6 +176,17 @@ pub struct Harmonics {
     pub memory: f64,
     /// Initial variance of each coefficient, in units of the noise variance.
     pub initial_variance: f64,
+}
+
+/// A complex matrix that turns the outputs' phasors in one mode into those in another (p x p).
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct PhasorMap {
+    /// Real part.
+    #[serde(with = "rows")]
+    pub real: DMatrix<f64>,
+    /// Imaginary part.
+    #[serde(with = "rows")]
+    pub imaginary: DMatrix<f64>,
 }
 
 /// How the estimated fault is compensated.

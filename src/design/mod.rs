@@ -2,9 +2,13 @@
 //!
 //! The data types and the certificate need no solver; making gains does (feature `design`).
 
+#[cfg(feature = "design")]
+pub mod assembly;
 pub mod augmented;
 pub mod certificate;
 pub mod commissioning;
+mod controllability;
+pub mod harmonics;
 #[cfg(feature = "design")]
 pub mod lmi;
 mod lyapunov;
@@ -22,6 +26,7 @@ use nalgebra::DMatrix;
 use serde::{Deserialize, Serialize};
 
 pub use certificate::{CertificateError, ControlCertificate};
+pub use controllability::check_controllable;
 pub use lyapunov::{DwellTime, Lyapunov};
 pub use observer::{ObserverCertificate, ObserverDesign};
 pub use record::{Design, FORMAT, Signal, Signals};

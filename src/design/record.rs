@@ -1,5 +1,6 @@
 //! The design as a record: plain data, everything the exporter ships and the FMUs read.
 
+use super::Synthesis;
 use crate::control::ControllerParameters;
 use crate::control::parameters::EstimatorMethod;
 use crate::plant::Dimensions;
@@ -25,6 +26,9 @@ pub struct Design {
     pub truth: Truth,
     /// The experiment the plant FMU plays.
     pub scenario: Scenario,
+    /// What proves the gains; none where they were not made by synthesis.
+    #[serde(default)]
+    pub synthesis: Option<Synthesis>,
 }
 
 /// Descriptions of the plant's signals.

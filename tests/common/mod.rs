@@ -174,12 +174,18 @@ pub fn controller(channel: Channel, noise: f64) -> ControllerParameters {
             response_length: length,
             window: 2 * (length + 1) + 20,
             predictors,
+            adapt: false,
             harmonics: Some(Harmonics {
                 period: core::f64::consts::TAU / 0.02,
                 count: 1,
                 memory: 3000.0,
                 initial_variance: 1e6,
             }),
+            harmonic_transfers: ftc::design::harmonics::transfers(
+                &plant,
+                core::f64::consts::TAU / 0.02,
+                1,
+            ),
             thresholds,
             debounce: 1,
             leverage_limit: 100.0,

@@ -39,6 +39,8 @@ pub struct Clock {
     stop: Option<f64>,
     /// The last communication point, as the importer counts.
     now: f64,
+    /// Steps made so far.
+    steps: u64,
     /// Where the importer wanted to go by a step that was refused; it may go on from there.
     wanted: f64,
     /// Whole ticks nearest to now, and what is left in units of `Te`, within half a tick.
@@ -64,6 +66,7 @@ impl Clock {
             sample_time,
             stop: None,
             now: 0.0,
+            steps: 0,
             wanted: 0.0,
             ticks: 0,
             remainder: 0.0,
@@ -117,9 +120,9 @@ impl Clock {
             ));
         }
         let to = from + step;
-        // A sum of steps may overshoot by its rounding, never by a noticeable part of a tick.
+        // A sum of steps may overshoot by its rounding errors, never by a good part of a tick.
         if let Some(stop) = self.stop
-            && to - stop > (1e-3 + resolution) * self.sample_time
+            && to - stop > 1e-3 * self.sample_time + self.steps as f64 * ulp(to)
         {
             return Err(format!("the step ends at {to}, after stopTime {stop}"));
         }
@@ -131,7 +134,7 @@ impl Clock {
             ));
         }
         let mut next = self.clone();
-        (next.now, next.wanted) = (to, to);
+        (next.now, next.wanted, next.steps) = (to, to, self.steps + 1);
         next.move_on(length, resolution);
         Ok(next)
     }

@@ -20,6 +20,7 @@ use crate::simulate::plant::PlantState;
 use clarabel::algebra::CscMatrix;
 use clarabel::solver::{DefaultSettings, DefaultSolver, IPSolver, SupportedConeT};
 use nalgebra::{DMatrix, DVector};
+use std::ops::AddAssign;
 
 /// What the controller is asked for.
 #[derive(Clone, Debug, PartialEq)]
@@ -34,6 +35,8 @@ pub struct PredictiveSpec {
     pub limits: Vec<Limits>,
     /// Standard deviation of each sensor's noise assumed by the filter (p), positive.
     pub noise: Vec<f64>,
+    /// Standard deviation of each disturbance channel assumed by the filter (s).
+    pub disturbance: Vec<f64>,
     /// Samples looked ahead, `N`.
     pub horizon: usize,
 }
@@ -219,7 +222,7 @@ impl Planner {
             from_state: pull * free,
             from_input,
             target: steady_state(a, b, &select)?,
-            kalman: kalman(plant, index, &spec.noise)?,
+            kalman: kalman(plant, index, spec)?,
         })
     }
 }
@@ -305,8 +308,13 @@ fn steady_state(
     Ok(inverse.columns(n, r).into_owned())
 }
 
-/// Gain of the steady Kalman filter of `[x; d]`, with the inputs' effect and the noise as scales.
-fn kalman(plant: &SwitchedPlant, index: usize, noise: &[f64]) -> Result<DMatrix<f64>, String> {
+/// Gain of the steady Kalman filter of `[x; d]`: the disturbance drives the state, and `d` wanders
+/// by a noise deviation each sample.
+fn kalman(
+    plant: &SwitchedPlant,
+    index: usize,
+    spec: &PredictiveSpec,
+) -> Result<DMatrix<f64>, String> {
     let mode = &plant.modes[index];
     let (p, n) = mode.c.shape();
     let mut a = DMatrix::identity(n + p, n + p);
@@ -314,12 +322,18 @@ fn kalman(plant: &SwitchedPlant, index: usize, noise: &[f64]) -> Result<DMatrix<
     let mut c = DMatrix::zeros(p, n + p);
     c.columns_mut(0, n).copy_from(&mode.c);
     c.columns_mut(n, p).fill_with_identity();
-    let variance = DMatrix::from_diagonal(&DVector::from_fn(p, |i, _| noise[i] * noise[i]));
-    let scale = variance.diagonal().mean();
-    let mut process = DMatrix::identity(n + p, n + p) * (1e-2 * scale);
-    process
-        .view_mut((n, n), (p, p))
-        .copy_from(&(0.1 * &variance));
+    let square = |values: &[f64]| {
+        DMatrix::from_diagonal(&DVector::from_iterator(
+            values.len(),
+            values.iter().map(|v| v * v),
+        ))
+    };
+    let variance = square(&spec.noise);
+    let driven = &mode.e * square(&spec.disturbance) * mode.e.transpose();
+    let floor = 1e-2 * variance.diagonal().mean();
+    let mut process = DMatrix::identity(n + p, n + p) * floor;
+    process.view_mut((0, 0), (n, n)).add_assign(&driven);
+    process.view_mut((n, n), (p, p)).copy_from(&variance);
     let covariance = riccati(&a.transpose(), &c.transpose(), &process, &variance)?;
     let innovation = &c * &covariance * c.transpose() + variance;
     let inverse = innovation

@@ -1,7 +1,5 @@
 //! The test slave, its C functions as a C program sees them, and an instance to play with.
 
-#![allow(dead_code, reason = "each test file uses a part of it")]
-
 #[path = "../../examples/staircase.rs"]
 pub mod staircase;
 

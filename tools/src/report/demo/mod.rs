@@ -1,0 +1,258 @@
+//! The page of one design: what happened in its scenario, with and without fault tolerance.
+
+mod events;
+mod facts;
+mod figures;
+mod tables;
+
+use super::page::{Block, KeyNumber, Page, Section};
+use super::svg;
+use super::text::{self, count, list, number};
+use anyhow::{Context, Result};
+use events::Alarms;
+use figures::Scene;
+use ftc::design::{Design, Signal};
+use ftc::simulate::closed_loop::Merits;
+use ftc::simulate::{Trajectory, Variant};
+use std::io::Write as _;
+use std::path::Path;
+
+/// Writes the page of a simulated design to `path` and each of its figures as `KEY.svg` beside it.
+///
+/// Every file appears complete or not at all. The trajectories may be any of the variants, in any
+/// order; what is missing is left out.
+///
+/// # Errors
+/// Names the file that could not be written.
+pub fn write(design: &Design, trajectories: &[Trajectory], path: &Path) -> Result<()> {
+    let page = page(design, trajectories);
+    let folder = match path.parent() {
+        Some(parent) if parent != Path::new("") => parent,
+        _ => Path::new("."),
+    };
+    std::fs::create_dir_all(folder)
+        .with_context(|| format!("cannot make the folder {}", folder.display()))?;
+    for figure in page.figures() {
+        let file = folder.join(format!("{}.svg", figure.key));
+        replace(folder, &file, &svg::document(figure))?;
+    }
+    replace(folder, path, &page.render())
+}
+
+/// Puts a finished file in the place of whatever was there.
+fn replace(folder: &Path, path: &Path, content: &str) -> Result<()> {
+    let attempt = || -> Result<()> {
+        let mut builder = tempfile::Builder::new();
+        #[cfg(unix)]
+        {
+            use std::os::unix::fs::PermissionsExt as _;
+            builder.permissions(std::fs::Permissions::from_mode(0o666));
+        }
+        let mut file = builder.tempfile_in(folder)?;
+        file.write_all(content.as_bytes())?;
+        file.persist(path)?;
+        Ok(())
+    };
+    attempt().with_context(|| format!("cannot write {}", path.display()))
+}
+
+/// What a variant is called everywhere on the page.
+fn variant_name(variant: Variant) -> &'static str {
+    match variant {
+        Variant::Ftc => "with FTC",
+        Variant::NoFtc => "without FTC",
+        Variant::ToldTheFault => "told the fault",
+        Variant::Additive => "additive FTC (printed)",
+        Variant::Predictive => "predictive control",
+    }
+}
+
+fn find(trajectories: &[Trajectory], variant: Variant) -> Option<&Trajectory> {
+    trajectories.iter().find(|run| run.variant == variant)
+}
+
+/// The description of signal `index`, or `symbol[index + 1]` where the design describes none.
+fn name_of(signals: &[Signal], index: usize, symbol: &str) -> String {
+    signals.get(index).map_or_else(
+        || format!("{symbol}[{}]", index + 1),
+        |signal| signal.name.clone(),
+    )
+}
+
+fn unit_of(signals: &[Signal], index: usize) -> Option<&str> {
+    signals.get(index).and_then(|signal| signal.unit.as_deref())
+}
+
+/// The whole page.
+pub(super) fn page(design: &Design, trajectories: &[Trajectory]) -> Page {
+    let scene = Scene::new(design, trajectories);
+    let mut sections = vec![
+        Section::new("Outputs")
+            .paragraph(
+                "What the plant really does (the true output, which no sensor of the faulty loop shows) with and \
+                 without fault-tolerant control (FTC), beside a controller that is told the true fault: no estimator \
+                 can do better. Thin grey is what the sensor says. Shaded: the fault of this sensor is present.",
+            )
+            .figures(scene.outputs()),
+        Section::new("Figures of merit").with(Block::Table(tables::merits(design, trajectories))),
+    ];
+    let faults = scene.faults();
+    if !faults.is_empty() {
+        sections.push(
+            Section::new("Sensor faults")
+                .paragraph(
+                    "The fault that is really there and the estimate that the controller takes out of the loop; below it \
+                     the residual against the threshold. The threshold widens where the present input lies outside \
+                     what the healthy database covers; drawn is its narrowest value.",
+                )
+                .figures(faults)
+                .figures(scene.residuals()),
+        );
+    }
+    sections.push(Section::new("Inputs").figures(scene.inputs()));
+    let disturbances = scene.disturbances();
+    if !disturbances.is_empty() {
+        sections.push(Section::new("Disturbance").figures(disturbances));
+    }
+    sections.push(Section::new("Design").with(Block::Facts(facts::facts(design))));
+    sections.push(
+        Section::new("Modes and sensors")
+            .with(Block::Table(tables::modes(design)))
+            .with(Block::Table(tables::sensors(design))),
+    );
+    Page {
+        title: format!("{}: fault-tolerant control, simulated", design.name),
+        lead: lead(design, trajectories),
+        key_numbers: key_numbers(design, trajectories),
+        sections,
+        footer: format!(
+            "Made by ftc-fmu {} from the design “{}”. The figures lie beside this page as SVG files.",
+            env!("CARGO_PKG_VERSION"),
+            design.name
+        ),
+    }
+}
+
+/// What happened, in a few sentences.
+fn lead(design: &Design, trajectories: &[Trajectory]) -> String {
+    let plant = &design.controller.plant;
+    let Some(run) = find(trajectories, Variant::Ftc).or(trajectories.first()) else {
+        return "Nothing was simulated.".into();
+    };
+    let te = plant.sample_time;
+    let samples = run.records.len();
+    let mut sentences = vec![format!(
+        "The loop ran for {} s ({} of {} s) through {}.",
+        number(samples as f64 * te),
+        count(samples, "sample"),
+        number(te),
+        count(events::modes_visited(run), "mode")
+    )];
+    let faulty: Vec<String> = (0..plant.dimensions().outputs)
+        .filter(|sensor| !events::fault_intervals(run, *sensor).is_empty())
+        .map(|sensor| name_of(&design.signals.outputs, sensor, "y"))
+        .collect();
+    if faulty.is_empty() {
+        sentences.push("No sensor was faulty.".into());
+        return sentences.join(" ");
+    }
+    let noun = if faulty.len() == 1 {
+        "sensor"
+    } else {
+        "sensors"
+    };
+    sentences.push(format!(
+        "During part of it, the {noun} {} did not tell the truth.",
+        list(&faulty)
+    ));
+    if let Some((without, against_told)) = ratios(design, trajectories) {
+        sentences.push(format!(
+            "Without fault-tolerant control the mean square error of the true outputs was {} as large as with it; \
+             a controller told the true fault would have reached {} of the error with it.",
+            times(without),
+            percent(1.0 / against_told)
+        ));
+    }
+    sentences.join(" ")
+}
+
+/// Smallest `MSE without FTC / MSE with FTC` and largest `MSE with FTC / MSE told the fault` over
+/// the tracked outputs (true signals).
+fn ratios(design: &Design, trajectories: &[Trajectory]) -> Option<(f64, f64)> {
+    let tracked = &design.controller.feedback.tracked;
+    let merits = |variant| find(trajectories, variant).map(|run| run.merits(tracked));
+    let ftc = merits(Variant::Ftc)?;
+    let over = |above: &[Merits], below: &[Merits], pick: fn(f64, f64) -> f64| {
+        above
+            .iter()
+            .zip(below)
+            .map(|(a, b)| a.truth.mse / b.truth.mse)
+            .reduce(pick)
+            .filter(|ratio| ratio.is_finite())
+    };
+    let without = over(&merits(Variant::NoFtc)?, &ftc, f64::min)?;
+    let against_told = over(&ftc, &merits(Variant::ToldTheFault)?, f64::max)?;
+    Some((without, against_told))
+}
+
+fn times(ratio: f64) -> String {
+    format!("{} times", rounded(ratio))
+}
+
+fn percent(ratio: f64) -> String {
+    format!("{} %", rounded(100.0 * ratio))
+}
+
+/// Three significant digits.
+fn rounded(value: f64) -> String {
+    let digits = if value >= 100.0 {
+        0
+    } else if value >= 10.0 {
+        1
+    } else {
+        2
+    };
+    if value < 1e5 {
+        text::aligned(value, digits)
+    } else {
+        number(value)
+    }
+}
+
+fn key_numbers(design: &Design, trajectories: &[Trajectory]) -> Vec<KeyNumber> {
+    let key = |value: String, meaning: &str| KeyNumber {
+        value,
+        meaning: meaning.into(),
+    };
+    let mut keys = Vec::new();
+    if let Some((without, against_told)) = ratios(design, trajectories) {
+        keys.push(key(
+            format!("{} ×", rounded(without)),
+            "smaller true mean square error than without FTC, for the output that gains least",
+        ));
+        keys.push(key(
+            format!("{} ×", text::aligned(against_told, 3)),
+            "the true mean square error of a controller told the fault, for the output farthest from it",
+        ));
+    }
+    if let Some(run) = find(trajectories, Variant::Ftc) {
+        let alarms = Alarms::of(run);
+        if alarms.onsets > 0 {
+            keys.push(key(
+                format!("{} of {}", alarms.found, alarms.onsets),
+                "sensor faults found",
+            ));
+        }
+        if let Some(delay) = alarms.longest_delay {
+            keys.push(key(
+                count(delay as usize, "sample"),
+                "from the onset of a fault to its detection, at most",
+            ));
+        }
+        keys.push(key(
+            alarms.false_alarms.to_string(),
+            "false alarms of healthy sensors",
+        ));
+    }
+    keys
+}

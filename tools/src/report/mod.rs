@@ -1,0 +1,23 @@
+//! Pages an engineer would forward: figures, tables and sentences in one self-contained file.
+//!
+//! A [`figure`] is plain data and becomes SVG in [`svg`]; a [`page`] is made of sections that hold
+//! figures, tables and key numbers; [`demo`] is the page of one simulated design. Nothing here
+//! needs a network or a script, and one file reads well in light, in dark, on a phone and on paper.
+//!
+//! SVG is written with the same template crate as the page. Three plotting crates were tried first:
+//! none lets colours follow the reader's scheme *and* leaves a gap where a sensor gives no number
+//! *and* gives ids that stay unique when twenty figures share a page; two of the three also fix the
+//! size in pixels and spend a third of a phone's width on the legend.
+
+mod axis;
+mod decimate;
+mod demo;
+pub mod figure;
+pub mod page;
+mod svg;
+mod text;
+
+pub use demo::write;
+
+#[cfg(test)]
+mod tests;
