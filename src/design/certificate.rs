@@ -148,7 +148,7 @@ impl Coordinates {
     }
 
     /// `matrix S X'` for a matrix that multiplies the state.
-    fn from_state(&self, matrix: &Enclosure) -> Enclosure {
+    fn after(&self, matrix: &Enclosure) -> Enclosure {
         &(matrix * &self.basis) * &self.right
     }
 
@@ -212,10 +212,7 @@ fn decay_block(
     let reduced = &Enclosure::square_times_identity(decay, size) * &own.whole;
     Enclosure::symmetric_blocks(&[
         vec![reduced.symmetric_part()],
-        vec![
-            own.from_state(&(&next.outward * &closed.a)),
-            next.whole.clone(),
-        ],
+        vec![own.after(&(&next.outward * &closed.a)), next.whole.clone()],
     ])
 }
 
@@ -235,12 +232,12 @@ fn attenuation_block(
             Enclosure::square_times_identity(gamma, disturbances),
         ],
         vec![
-            own.from_state(&(&next.outward * &closed.a)),
+            own.after(&(&next.outward * &closed.a)),
             &next.outward * &closed.e,
             next.whole.clone(),
         ],
         vec![
-            own.from_state(&closed.h),
+            own.after(&closed.h),
             Enclosure::zeros(signals, disturbances),
             Enclosure::zeros(signals, size),
             Enclosure::exact(DMatrix::identity(signals, signals)),
