@@ -1,5 +1,5 @@
 //! Command line.
-#[allow(dead_code)]
+#[allow(dead_code, unused_imports)]
 mod report;
 
 fn main() {}
