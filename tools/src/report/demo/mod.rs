@@ -212,7 +212,7 @@ fn beside_without(ratio: f64) -> String {
     if ratio > 1.1 {
         format!("at least {} times smaller than without it", rounded(ratio))
     } else if ratio > 1.0 / 1.1 {
-        "for at least one of them about the same as without it".into()
+        "about the same as without it for at least one of them".into()
     } else {
         format!(
             "up to {} times larger than without it",
