@@ -122,6 +122,29 @@ fn the_same_inputs_give_the_same_bits_and_a_copy_is_a_snapshot() {
     assert_eq!(state, copy);
 }
 
+/// With `bumpless`, the first command in a mode is the last of the mode before.
+#[test]
+fn a_bumpless_switch_leaves_the_command_where_it_was() {
+    for bumpless in [false, true] {
+        let mut parameters = controller(Channel::State, 0.0);
+        parameters.feedback.bumpless = bumpless;
+        let controller = Controller::new(parameters);
+        let mut state = controller.initial_state(0);
+        for k in 0..50 {
+            tick(&controller, &mut state, k, 0, &[0.2, -0.1], &[0.25, -0.15]);
+        }
+        let before = state.command.clone();
+        tick(&controller, &mut state, 50, 1, &[0.2, -0.1], &[0.25, -0.15]);
+        let jump = state
+            .command
+            .iter()
+            .zip(&before)
+            .map(|(a, b)| (a - b).abs())
+            .fold(0.0, f64::max);
+        assert_eq!(bumpless, jump < 1e-9, "jump {jump}");
+    }
+}
+
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(300))]
     /// Any bit pattern as measurement, any finite reference, any mode: every output stays finite.

@@ -2,10 +2,13 @@
 
 mod plants;
 
-use plants::{Channel, paper, paper_spec};
+use ftc::design::augmented::augment;
 use ftc::design::state_feedback::synthesise;
-use ftc::design::{DesignError, Lyapunov};
+use ftc::design::{ControlSpec, DesignError, Lyapunov, Objective, StateFeedback, Units};
 use ftc::plant::scaling::Scaling;
+use ftc::plant::{SwitchedPlant, spectral_radius};
+use nalgebra::{Complex, DMatrix};
+use plants::{Channel, paper, paper_spec, random_plant, rectifier};
 
 /// Half a unit of the fourth decimal, to which the reference values are given, plus the hair that
 /// is given up for a margin.
@@ -48,10 +51,6 @@ fn dwell_reaches_the_reference_values_per_mode() {
         let plant = paper(channel);
         let spec = paper_spec(latency, decay, Lyapunov::Dwell);
         let design = synthesise(&plant, &spec, &Scaling::automatic(&plant)).unwrap();
-        println!(
-            "{channel:?} {latency} {decay} {:?} {:?}",
-            design.gamma, design.dwell
-        );
         for (gamma, reference) in design.gamma.as_ref().unwrap().iter().zip(references) {
             assert_agrees(*gamma, reference);
         }
@@ -70,7 +69,6 @@ fn switched_equals_common_where_both_exist() {
         let plant = paper(channel);
         let spec = paper_spec(0, decay, Lyapunov::Switched);
         let design = synthesise(&plant, &spec, &Scaling::automatic(&plant)).unwrap();
-        println!("{:?} {:?}", design.gamma, design.optimum);
         assert!(
             design
                 .gamma
@@ -92,7 +90,6 @@ fn latency_makes_arbitrary_switching_infeasible_and_the_verdict_says_so() {
             let plant = paper(channel);
             let spec = paper_spec(1, decay, lyapunov);
             let error = synthesise(&plant, &spec, &Scaling::automatic(&plant)).unwrap_err();
-            println!("{error}");
             let DesignError::Infeasible(verdict) = error else {
                 panic!("{error:?}");
             };
@@ -100,4 +97,204 @@ fn latency_makes_arbitrary_switching_infeasible_and_the_verdict_says_so() {
             assert!(!verdict.blocks.is_empty());
         }
     }
+}
+
+/// `A + B K~` and `H + D K~` of a mode in physical units, with `E`.
+fn closed_loop(
+    plant: &SwitchedPlant,
+    design: &StateFeedback,
+    mode: usize,
+) -> (DMatrix<f64>, DMatrix<f64>, DMatrix<f64>) {
+    let spec = &design.spec;
+    let units = Units::unit(plant, spec.tracked.len());
+    let model = augment(plant, spec, &units).swap_remove(mode);
+    let gains = &design.modes[mode];
+    let (m, n) = gains.state_feedback.shape();
+    let previous = gains.previous_input.ncols();
+    let mut gain = DMatrix::zeros(m, model.a.nrows());
+    gain.columns_mut(0, n).copy_from(&gains.state_feedback);
+    gain.columns_mut(n, previous)
+        .copy_from(&gains.previous_input);
+    gain.columns_mut(n + previous, spec.tracked.len())
+        .copy_from(&gains.integral);
+    (model.a + model.b * &gain, model.e, model.h + model.d * gain)
+}
+
+/// The largest singular value of `C (zI - A)^-1 B` over a fine grid of the unit circle.
+fn peak_gain((a, b, c): (DMatrix<f64>, DMatrix<f64>, DMatrix<f64>)) -> f64 {
+    let complex = |matrix: &DMatrix<f64>| matrix.map(|value| Complex::new(value, 0.0));
+    let (a, b, c) = (complex(&a), complex(&b), complex(&c));
+    let low = (0..200).map(|k| 1e-5 * 1.05_f64.powi(k));
+    let high = (0..=400).map(|k| f64::from(k) * std::f64::consts::PI / 400.0);
+    low.chain(high)
+        .map(|angle| {
+            let z = Complex::from_polar(1.0, angle);
+            let shifted = DMatrix::from_diagonal_element(a.nrows(), a.nrows(), z) - &a;
+            let response = &c * shifted.lu().solve(&b).expect("no pole on the unit circle");
+            response.singular_values().max()
+        })
+        .fold(0.0, f64::max)
+}
+
+#[test]
+fn a_single_mode_reaches_its_gamma_and_never_exceeds_it() {
+    for channel in [Channel::State, Channel::Output] {
+        for latency in [0, 1] {
+            let plant = paper(channel);
+            // A slow decay, so that attenuation alone decides and the bound is tight.
+            let spec = paper_spec(latency, 0.999, Lyapunov::Dwell);
+            let design = synthesise(&plant, &spec, &Scaling::automatic(&plant)).unwrap();
+            for (mode, gamma) in design.gamma.as_ref().unwrap().iter().enumerate() {
+                let peak = peak_gain(closed_loop(&plant, &design, mode));
+                assert!(
+                    peak <= *gamma,
+                    "{channel:?} {latency}: {peak} above {gamma}"
+                );
+                assert!(
+                    peak > 0.99 * gamma,
+                    "{channel:?} {latency}: {peak} far below {gamma}"
+                );
+            }
+        }
+    }
+}
+
+#[test]
+fn scaling_changes_neither_gamma_nor_the_verdict() {
+    let plant = paper(Channel::State);
+    let spec = paper_spec(0, 0.7, Lyapunov::Common);
+    let nominal = Scaling {
+        states: vec![400.0, 0.003],
+        inputs: vec![0.01, 7.0],
+        outputs: vec![90.0, 1e-4],
+    };
+    let unscaled = synthesise(&plant, &spec, &Scaling::unit(2, 2, 2)).unwrap();
+    let scaled = synthesise(&plant, &spec, &Scaling::automatic(&plant)).unwrap();
+    // The same plant in other units: its weights and its gamma follow.
+    let foreign = nominal.apply(&plant);
+    let foreign_spec = ControlSpec {
+        output_weight: vec![90.0, 1e-4],
+        integral_weight: vec![0.3 * 90.0, 0.3 * 1e-4],
+        input_weight: vec![0.1 * 0.01, 0.1 * 7.0],
+        ..spec
+    };
+    let foreign_units = synthesise(&foreign, &foreign_spec, &Scaling::automatic(&foreign)).unwrap();
+    for design in [unscaled, scaled, foreign_units] {
+        assert_agrees(design.gamma.unwrap()[0], 2.1146);
+    }
+}
+
+#[test]
+fn the_rectifier_in_si_units_meets_its_decay() {
+    let plant = rectifier();
+    for (lyapunov, decay) in [(Lyapunov::Dwell, 0.95), (Lyapunov::Common, 0.98)] {
+        let spec = ControlSpec {
+            lyapunov,
+            decay,
+            output_weight: vec![1.0 / 600.0, 1.0 / 30.0],
+            integral_weight: vec![10.0 / 600.0, 10.0 / 30.0],
+            input_weight: vec![0.1; 2],
+            ..ControlSpec::new(plant.dimensions())
+        };
+        let design = synthesise(&plant, &spec, &Scaling::automatic(&plant)).unwrap();
+        design.verify(&plant).unwrap();
+        for mode in 0..2 {
+            assert!(spectral_radius(&closed_loop(&plant, &design, mode).0) < decay);
+        }
+    }
+}
+
+#[test]
+fn random_plants_are_designed_certified_and_do_what_was_promised() {
+    for (sample_time, decay) in [(0.1, 0.97), (0.01, 0.995)] {
+        let mut designed = 0;
+        for seed in 0..24 {
+            let plant = random_plant(seed, sample_time);
+            let lyapunov =
+                [Lyapunov::Common, Lyapunov::Switched, Lyapunov::Dwell][seed as usize % 3];
+            let dims = plant.dimensions();
+            let r = dims.outputs.min(dims.inputs);
+            let spec = ControlSpec {
+                decay,
+                lyapunov,
+                latency: seed as usize / 3 % 2,
+                integral_weight: vec![0.3; r],
+                input_weight: vec![0.1; dims.inputs],
+                ..ControlSpec::new(dims)
+            };
+            let design = match synthesise(&plant, &spec, &Scaling::automatic(&plant)) {
+                Ok(design) => design,
+                Err(DesignError::Infeasible(verdict)) => {
+                    assert!(!verdict.blocks.is_empty());
+                    continue;
+                }
+                Err(error) => panic!("Te {sample_time} seed {seed}: {error}"),
+            };
+            designed += 1;
+            let gamma = design.gamma.as_ref().unwrap();
+            let optimum = design.optimum.as_ref().unwrap();
+            for mode in 0..plant.modes.len() {
+                let closed = closed_loop(&plant, &design, mode);
+                assert!(spectral_radius(&closed.0) < decay, "seed {seed}");
+                assert!(peak_gain(closed) <= gamma[mode], "seed {seed}");
+                assert!(
+                    gamma[mode] < 1.0001 * optimum[mode],
+                    "seed {seed}: {} {}",
+                    gamma[mode],
+                    optimum[mode]
+                );
+            }
+        }
+        assert!(designed >= 16, "{designed}");
+    }
+}
+
+#[test]
+fn decay_alone_is_theorem_one() {
+    let plant = paper(Channel::State);
+    for lyapunov in [Lyapunov::Common, Lyapunov::Switched, Lyapunov::Dwell] {
+        let spec = ControlSpec {
+            objective: Objective::Decay,
+            ..paper_spec(0, 0.6, lyapunov)
+        };
+        let design = synthesise(&plant, &spec, &Scaling::automatic(&plant)).unwrap();
+        assert_eq!(design.gamma, None);
+        for mode in 0..2 {
+            assert!(spectral_radius(&closed_loop(&plant, &design, mode).0) < 0.6);
+        }
+    }
+}
+
+#[test]
+fn advice_is_good_advice() {
+    let plant = paper(Channel::State);
+    let spec = paper_spec(1, 0.7, Lyapunov::Common);
+    let scaling = Scaling::automatic(&plant);
+    let Err(DesignError::Infeasible(verdict)) = synthesise(&plant, &spec, &scaling) else {
+        panic!("arbitrary switching with latency is infeasible on this plant");
+    };
+    assert!(!verdict.advice.is_empty());
+    for advice in &verdict.advice {
+        let followed = advice.apply(&spec);
+        assert_ne!(followed, spec);
+        synthesise(&plant, &followed, &scaling).unwrap();
+    }
+}
+
+#[test]
+fn more_tracked_outputs_than_inputs_are_refused_at_once() {
+    let mut plant = paper(Channel::State);
+    for mode in &mut plant.modes {
+        mode.b = mode.b.columns(0, 1).into_owned();
+        mode.operating_point.u.truncate(1);
+    }
+    let spec = ControlSpec {
+        input_weight: vec![0.1],
+        ..paper_spec(0, 0.9, Lyapunov::Common)
+    };
+    let error = synthesise(&plant, &spec, &Scaling::automatic(&plant)).unwrap_err();
+    assert_eq!(
+        error.to_string(),
+        "2 tracked outputs need at least 2 inputs, but the plant has 1: track fewer outputs"
+    );
 }

@@ -1,1 +1,41 @@
-//! To be filled.
+//! The one table of an FMU's variables, and what is made from it.
+//!
+//! A value reference is written down once: it is the position of the variable in its
+//! [`VariableTable`]. The exporter turns the table into `modelDescription.xml` (feature `xml`),
+//! the binary inside the FMU answers the importer's get and set calls from the same table, and
+//! the slave finds its signals by [`Role`], never by name. So the XML and the binary cannot
+//! disagree.
+//!
+//! ```text
+//! design ── Interface ──> controller() / plant() ── VariableTable ──┬─> modelDescription.xml
+//!                                                                   └─> the C interface (fmu-abi)
+//! ```
+//!
+//! The crate knows no C, and of a design only its sizes and names.
+
+mod check;
+mod design;
+mod guid;
+mod interface;
+mod table;
+mod units;
+mod variable;
+#[cfg(feature = "xml")]
+pub mod xml;
+
+pub use guid::{CONTROLLER, PLANT, guid};
+pub use interface::{Interface, SignalInfo, controller, plant};
+pub use table::{Span, VariableTable};
+pub use variable::{Causality, Initial, Kind, Role, Variability, Variable};
+
+/// Log categories an importer may switch on and off: name and description.
+///
+/// The names are the standard's own, so that importers know them without reading the XML.
+pub const LOG_CATEGORIES: [(&str, &str); 6] = [
+    ("logEvents", "Life-cycle events of the instance"),
+    ("logStatusWarning", "Calls that returned fmi2Warning"),
+    ("logStatusDiscard", "Calls that returned fmi2Discard"),
+    ("logStatusError", "Calls that returned fmi2Error"),
+    ("logStatusFatal", "Calls that returned fmi2Fatal"),
+    ("logAll", "Every category"),
+];

@@ -5,7 +5,8 @@ use super::estimator::{EstimatorState, Observation};
 use super::integrator;
 use super::kernel;
 use super::observer::{ObservedMode, ObserverState};
-use super::parameters::{Compensation, ControllerParameters, Limits};
+use super::parameters::{Compensation, ControllerParameters, FeedbackGains, Limits};
+use crate::plant::OperatingPoint;
 use nalgebra::DMatrix;
 use serde::{Deserialize, Serialize};
 
@@ -16,6 +17,8 @@ pub struct Controller {
     modes: Vec<ObservedMode>,
     /// `K_i C_i^+` per mode (m x p), for the printed additive control.
     static_gains: Vec<DMatrix<f64>>,
+    /// `G_i^+` per mode (q x m), for bumpless switching.
+    integral_inverses: Vec<DMatrix<f64>>,
 }
 
 /// What a tick is told.
@@ -55,7 +58,7 @@ pub struct ControllerState {
     pub observer: ObserverState,
     /// Fault estimator.
     pub estimator: EstimatorState,
-    /// Integrator state `Z` (r).
+    /// Integrator state `Z` and resonators (q).
     pub integral: Vec<f64>,
     /// The printed additive control, where it is chosen.
     additive: Option<AdditiveControl>,
@@ -97,10 +100,17 @@ impl Controller {
             .zip(&parameters.feedback.modes)
             .map(|(mode, gains)| &gains.state_feedback * pseudo_inverse(&mode.c))
             .collect();
+        let integral_inverses = parameters
+            .feedback
+            .modes
+            .iter()
+            .map(|gains| pseudo_inverse(&gains.integral))
+            .collect();
         Self {
             parameters,
             modes,
             static_gains,
+            integral_inverses,
         }
     }
 
@@ -118,7 +128,7 @@ impl Controller {
             mode: None,
             observer: ObserverState::new(&point.x, dims.outputs),
             estimator: EstimatorState::new(&self.parameters.estimator, &point.u, dims.outputs),
-            integral: vec![0.0; tracked],
+            integral: vec![0.0; self.parameters.feedback.integral_size()],
             additive: (self.parameters.compensation == Compensation::Additive)
                 .then(|| AdditiveControl::new(tracked, dims.inputs)),
             command: point.u.clone(),
@@ -140,7 +150,7 @@ impl Controller {
             return;
         };
         let point = &described.operating_point;
-        let left = self.enter(state, mode);
+        let left = self.enter(state, mode, sample.thresholds);
         state.estimator.observe(
             &self.parameters.estimator,
             &Observation {
@@ -160,15 +170,20 @@ impl Controller {
             mode,
             &state.corrected,
         );
-        self.command(state, mode, &point.x, &point.u, sample.compensate);
+        if left != mode && self.parameters.feedback.bumpless {
+            self.transfer(state, mode, point);
+        }
+        self.command(state, mode, point, sample.compensate);
         self.advance(state, model, mode, sample);
     }
 
     /// Notes the mode and returns the one just left.
-    fn enter(&self, state: &mut ControllerState, mode: usize) -> usize {
+    fn enter(&self, state: &mut ControllerState, mode: usize, thresholds: &[f64]) -> usize {
         let left = state.mode.replace(mode).unwrap_or(mode);
         if left != mode {
-            state.estimator.mode_entered(&self.parameters.estimator);
+            state
+                .estimator
+                .mode_entered(&self.parameters.estimator, left, mode, thresholds);
         }
         left
     }
@@ -201,13 +216,34 @@ impl Controller {
         kernel::bound(&mut state.corrected);
     }
 
-    /// `u = u0 + K (x_hat - x0) + G Z + V (u_prev - u0)`, clamped to the input's limits.
+    /// Moves the integral part so that the mode just entered repeats the last command.
+    fn transfer(&self, state: &mut ControllerState, mode: usize, point: &OperatingPoint) {
+        let Some((gains, inverse)) = self
+            .parameters
+            .feedback
+            .modes
+            .get(mode)
+            .zip(self.integral_inverses.get(mode))
+        else {
+            return;
+        };
+        kernel::copy(&mut state.excess, &state.command);
+        kernel::copy(&mut state.acting, &state.command);
+        feedback(state, gains, point);
+        for (jump, &new) in state.excess.iter_mut().zip(&state.command) {
+            *jump -= new;
+        }
+        kernel::add_product(&mut state.integral, inverse, &state.excess);
+        kernel::bound(&mut state.integral);
+        kernel::copy(&mut state.command, &state.acting);
+    }
+
+    /// The command of this sample, compensated and clamped to the input's limits.
     fn command(
         &self,
         state: &mut ControllerState,
         mode: usize,
-        x0: &[f64],
-        u0: &[f64],
+        point: &OperatingPoint,
         compensate: Compensate<'_>,
     ) {
         let Some(gains) = self.parameters.feedback.modes.get(mode) else {
@@ -216,12 +252,7 @@ impl Controller {
         if self.parameters.feedback.latency > 0 {
             kernel::copy(&mut state.acting, &state.command);
         }
-        kernel::copy(&mut state.command, u0);
-        kernel::difference(&mut state.deviation, &state.observer.estimate, x0);
-        kernel::add_product(&mut state.command, &gains.state_feedback, &state.deviation);
-        kernel::add_product(&mut state.command, &gains.integral, &state.integral);
-        kernel::difference(&mut state.deviation, &state.acting, u0);
-        kernel::add_product(&mut state.command, &gains.previous_input, &state.deviation);
+        feedback(state, gains, point);
         if let Some(additive) = &mut state.additive
             && compensate == Compensate::Estimate
             && let Some(gain) = self.static_gains.get(mode)
@@ -264,13 +295,23 @@ impl Controller {
                 self.parameters.plant.sample_time,
                 sample.reference,
                 &state.corrected,
-                &feedback.tracked,
+                feedback,
                 gains,
                 &state.excess,
             );
         }
         state.estimator.remember(&state.acting);
     }
+}
+
+/// `u = u0 + K (x_hat - x0) + G Z + V (u_prev - u0)`.
+fn feedback(state: &mut ControllerState, gains: &FeedbackGains, point: &OperatingPoint) {
+    kernel::copy(&mut state.command, &point.u);
+    kernel::difference(&mut state.deviation, &state.observer.estimate, &point.x);
+    kernel::add_product(&mut state.command, &gains.state_feedback, &state.deviation);
+    kernel::add_product(&mut state.command, &gains.integral, &state.integral);
+    kernel::difference(&mut state.deviation, &state.acting, &point.u);
+    kernel::add_product(&mut state.command, &gains.previous_input, &state.deviation);
 }
 
 /// Clamps each command to its limits and keeps in `excess` what was taken off (clamped - wanted).

@@ -46,8 +46,22 @@ pub struct StateFeedback {
     pub tracked: Vec<usize>,
     /// Samples between the computation of a command and its action: 0 or 1.
     pub latency: usize,
+    /// Angle per sample, in radians, of each resonator of the internal model; usually none.
+    #[serde(default)]
+    pub resonators: Vec<f64>,
+    /// Whether a mode switch leaves the command where it was, by moving the integral part.
+    #[serde(default)]
+    pub bumpless: bool,
     /// Gains per mode.
     pub modes: Vec<FeedbackGains>,
+}
+
+impl StateFeedback {
+    /// Size `q` of the integral part: one integrator per tracked output, and two states per
+    /// tracked output and resonator.
+    pub fn integral_size(&self) -> usize {
+        self.tracked.len() * (1 + 2 * self.resonators.len())
+    }
 }
 
 /// The gains of one mode: `u = u0 + K (x - x0) + G Z + V (u_prev - u0)`.
@@ -56,13 +70,13 @@ pub struct FeedbackGains {
     /// `K_i` (m x n).
     #[serde(with = "rows")]
     pub state_feedback: DMatrix<f64>,
-    /// `G_i` (m x r).
+    /// `G_i` (m x q); `q = r` without resonators.
     #[serde(with = "rows")]
     pub integral: DMatrix<f64>,
     /// Gain on the command still acting (m x m; zero columns when latency is 0).
     #[serde(with = "rows")]
     pub previous_input: DMatrix<f64>,
-    /// Back-calculation gain (r x m): how a saturated command unwinds the integrator.
+    /// Back-calculation gain (q x m): how a saturated command unwinds the integrator.
     #[serde(with = "rows")]
     pub anti_windup: DMatrix<f64>,
 }
@@ -118,8 +132,14 @@ pub struct Estimator {
     pub window: usize,
     /// The predictor of each mode; none for the other methods.
     pub predictors: Vec<Predictor>,
+    /// Whether the response goes on being learned while all is well.
+    #[serde(default)]
+    pub adapt: bool,
     /// The periodic disturbance whose response is learned on line.
     pub harmonics: Option<Harmonics>,
+    /// What a response learned in one mode tells of another, `[from][to][harmonic]`; may be empty.
+    #[serde(default)]
+    pub harmonic_transfers: Vec<Vec<Vec<PhasorMap>>>,
     /// Decision threshold per sensor (p), in output units, before widening by the leverage.
     pub thresholds: Vec<f64>,
     /// Consecutive samples needed to raise or release a fault.
@@ -156,6 +176,17 @@ pub struct Harmonics {
     pub memory: f64,
     /// Initial variance of each coefficient, in units of the noise variance.
     pub initial_variance: f64,
+}
+
+/// A complex matrix that turns the outputs' phasors in one mode into those in another (p x p).
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct PhasorMap {
+    /// Real part.
+    #[serde(with = "rows")]
+    pub real: DMatrix<f64>,
+    /// Imaginary part.
+    #[serde(with = "rows")]
+    pub imaginary: DMatrix<f64>,
 }
 
 /// How the estimated fault is compensated.

@@ -14,9 +14,13 @@ mod enclosure;
 pub use enclosure::Enclosure;
 
 use super::augmented::{AugmentedMode, augment, scaled};
+use super::lyapunov::all_pairs;
+use super::observer::ObserverDesign;
 use super::state_feedback::{ModeGains, StateFeedback};
+use super::units::power_of_two;
 use super::verdict::{BlockKind, BlockName};
 use super::{DwellTime, Lyapunov, Units};
+use crate::control::parameters::Gain;
 use crate::plant::{Dimensions, SwitchedPlant};
 use crate::rows;
 use nalgebra::DMatrix;
@@ -52,7 +56,7 @@ pub enum CertificateError {
 }
 
 /// Proves a claim about a mode and its successor (indices from 0).
-pub(crate) fn prove(
+fn prove(
     claim: &Enclosure,
     kind: BlockKind,
     mode: usize,
@@ -124,12 +128,7 @@ pub(crate) fn verify_state_feedback(
 }
 
 /// `[alpha^2 S_i (A S_i)'; . S_j]`.
-pub(crate) fn decay_block(
-    a: &Enclosure,
-    own: &Enclosure,
-    next: &Enclosure,
-    decay: f64,
-) -> Enclosure {
+fn decay_block(a: &Enclosure, own: &Enclosure, next: &Enclosure, decay: f64) -> Enclosure {
     let size = own.shape().0;
     Enclosure::symmetric_blocks(&[
         vec![&Enclosure::square_times_identity(decay, size) * own],
@@ -163,19 +162,13 @@ fn attenuation_block(
 }
 
 /// `mu S_j - S_i` for every switch from `i` to `j`, and the dwell time that follows from `mu`.
-pub(crate) fn prove_dwell(
+fn prove_dwell(
     matrices: &[Enclosure],
     dwell: &DwellTime,
     decay: f64,
     sample_time: f64,
 ) -> Result<(), CertificateError> {
-    let claimed = DwellTime::new(dwell.mu, decay, sample_time);
-    let stated = dwell.samples >= claimed.samples && dwell.seconds >= claimed.seconds;
-    if !(stated && dwell.mu >= 1.0 && decay < 1.0) {
-        return Err(CertificateError::Malformed(
-            "the dwell time does not follow from mu and the decay rate".into(),
-        ));
-    }
+    check_dwell(dwell, decay, sample_time)?;
     for (i, own) in matrices.iter().enumerate() {
         for (j, next) in matrices.iter().enumerate().filter(|(j, _)| *j != i) {
             let factor = DMatrix::from_diagonal_element(own.shape().0, own.shape().0, dwell.mu);
@@ -184,6 +177,16 @@ pub(crate) fn prove_dwell(
         }
     }
     Ok(())
+}
+
+/// The stated dwell time is no shorter than `mu` and the decay rate ask for.
+fn check_dwell(dwell: &DwellTime, decay: f64, sample_time: f64) -> Result<(), CertificateError> {
+    let due = DwellTime::new(dwell.mu, decay, sample_time);
+    let stated = dwell.samples >= due.samples && dwell.seconds >= due.seconds;
+    require(&[(
+        stated && dwell.mu >= 1.0 && decay < 1.0,
+        "the dwell time does not follow from mu and the decay rate",
+    )])
 }
 
 /// `K~ = [K, K_u, G]` in the certificate's units.
@@ -201,6 +204,174 @@ fn scaled_gain(gains: &ModeGains, units: &Units, latency: usize) -> DMatrix<f64>
     let integral = scaled(&gains.integral, &units.inputs, &units.integrators);
     gain.columns_mut(n + previous, r).copy_from(&integral);
     gain
+}
+
+/// The error dynamics `T_ij A_i - K_i C_i` of an observer in its certificate's units, enclosed.
+fn error_dynamics(plant: &SwitchedPlant, design: &ObserverDesign, i: usize, j: usize) -> Enclosure {
+    let (states, outputs) = (&design.certificate.states, &design.certificate.outputs);
+    let matrix = |matrix: &DMatrix<f64>, rows: &[f64], columns: &[f64]| {
+        Enclosure::rounded(scaled(matrix, rows, columns))
+    };
+    let (own, next) = (&plant.modes[i], &plant.modes[j]);
+    let a = matrix(&own.a, states, states);
+    let gain = matrix(&design.observer.gains[i].0, states, outputs);
+    let decoupling = matrix(&design.observer.decoupling[i][j].0, states, outputs);
+    let seen = &matrix(&next.c, outputs, states) * &a;
+    let injected = &gain * &matrix(&own.c, outputs, states);
+    &(&a - &(&decoupling * &seen)) - &injected
+}
+
+/// `[f P_i (P_j N)'; . P_j]`: the function of mode `j` after a sample is below `f` times that of
+/// mode `i` before it.
+fn growth_block(
+    error: &Enclosure,
+    own: &Enclosure,
+    next: &Enclosure,
+    factor: &Enclosure,
+) -> Enclosure {
+    Enclosure::symmetric_blocks(&[vec![factor * own], vec![next * error, next.clone()]])
+}
+
+/// Proves everything an observer claims: the decay of its error and the dwell time.
+pub(crate) fn verify_observer(
+    plant: &SwitchedPlant,
+    design: &ObserverDesign,
+) -> Result<(), CertificateError> {
+    check_observer_sizes(plant, design)?;
+    let (spec, modes) = (&design.spec, plant.modes.len());
+    let matrices: Vec<Enclosure> = design
+        .certificate
+        .lyapunov
+        .iter()
+        .map(|matrix| Enclosure::exact(matrix.0.clone()))
+        .collect();
+    let lyapunov = |mode: usize| &matrices[spec.lyapunov.index(mode)];
+    let squared = Enclosure::square_times_identity(spec.decay, plant.modes[0].a.nrows());
+    for (i, j) in spec.lyapunov.observer_pairs(modes) {
+        let error = error_dynamics(plant, design, i, j);
+        let block = growth_block(&error, lyapunov(i), lyapunov(j), &squared);
+        prove(&block, BlockKind::ObserverDecay, i, j)?;
+    }
+    let Some(dwell) = &design.dwell else {
+        return Ok(());
+    };
+    check_dwell(dwell, spec.decay, plant.sample_time)?;
+    let size = plant.modes[0].a.nrows();
+    let mu = Enclosure::exact(DMatrix::from_diagonal_element(size, size, dwell.mu));
+    let factor = &mu * &squared;
+    for (i, j) in all_pairs(modes).into_iter().filter(|(i, j)| i != j) {
+        let error = error_dynamics(plant, design, i, j);
+        let block = growth_block(&error, lyapunov(i), lyapunov(j), &factor);
+        prove(&block, BlockKind::LyapunovRatio, i, j)?;
+    }
+    Ok(())
+}
+
+/// The least factor `mu >= 1` by which
+/// an observer's Lyapunov function exceeds `decay^2` over a switch.
+#[cfg(feature = "design")]
+pub(crate) fn observer_growth(plant: &SwitchedPlant, design: &ObserverDesign) -> Option<f64> {
+    let matrices = &design.certificate.lyapunov;
+    let switches = all_pairs(plant.modes.len())
+        .into_iter()
+        .filter(|(i, j)| i != j);
+    let mut mu = 1.0_f64;
+    for (i, j) in switches {
+        let error = error_dynamics(plant, design, i, j).into_midpoint();
+        let after = error.transpose() * &matrices[j].0 * &error;
+        let growth = largest_ratio(&after, &matrices[i].0)?;
+        mu = mu.max(growth / design.spec.decay.powi(2));
+    }
+    Some(mu)
+}
+
+/// The dwell time that the factor between Lyapunov matrices `S` asks for, with the smallest `mu`
+/// that can be proved.
+#[cfg(feature = "design")]
+pub(crate) fn provable_dwell(
+    matrices: &[DMatrix<f64>],
+    decay: f64,
+    sample_time: f64,
+) -> Result<DwellTime, CertificateError> {
+    let mut mu = 1.0_f64;
+    for (i, j) in all_pairs(matrices.len()) {
+        let ratio = largest_ratio(&matrices[i], &matrices[j])
+            .ok_or_else(|| CertificateError::Unproved(BlockName::new(BlockKind::Lyapunov, j, j)))?;
+        mu = mu.max(ratio);
+    }
+    let enclosed: Vec<Enclosure> = matrices.iter().cloned().map(Enclosure::exact).collect();
+    let mut outcome = Err(CertificateError::Malformed(
+        "no dwell time was tried".into(),
+    ));
+    for allowance in DwellTime::ALLOWANCES {
+        let dwell = DwellTime::new(mu * (1.0 + allowance), decay, sample_time);
+        outcome = prove_dwell(&enclosed, &dwell, decay, sample_time).map(|()| dwell);
+        if outcome.is_ok() {
+            break;
+        }
+    }
+    outcome
+}
+
+/// The largest eigenvalue of `below^-1 above` for symmetric matrices, `below` positive definite.
+#[cfg(feature = "design")]
+pub(crate) fn largest_ratio(above: &DMatrix<f64>, below: &DMatrix<f64>) -> Option<f64> {
+    let factor = below.clone().cholesky()?.unpack();
+    let half = factor.solve_lower_triangular(above)?;
+    let ratio = factor.solve_lower_triangular(&half.transpose())?;
+    let symmetric = 0.5 * (&ratio + ratio.transpose());
+    Some(symmetric.symmetric_eigenvalues().max())
+}
+
+/// Everything [`verify_observer`] indexes has the size it must have.
+fn check_observer_sizes(
+    plant: &SwitchedPlant,
+    design: &ObserverDesign,
+) -> Result<(), CertificateError> {
+    let malformed = CertificateError::Malformed;
+    let dims = Dimensions::check(plant).map_err(malformed)?;
+    design.spec.check().map_err(malformed)?;
+    let (n, p, modes) = (dims.states, dims.outputs, plant.modes.len());
+    let (observer, certificate) = (&design.observer, &design.certificate);
+    let fits = |gain: &Gain| gain.0.shape() == (n, p);
+    let gains_fit = observer.gains.len() == modes
+        && observer.decoupling.len() == modes
+        && observer.decoupling.iter().all(|row| row.len() == modes)
+        && observer.gains.iter().all(fits)
+        && observer.decoupling.iter().flatten().all(fits);
+    let matrices_fit = certificate.lyapunov.len() == design.spec.lyapunov.matrices(modes)
+        && certificate
+            .lyapunov
+            .iter()
+            .all(|matrix| matrix.0.shape() == (n, n));
+    let mut units = certificate.states.iter().chain(&certificate.outputs);
+    let units_fit = certificate.states.len() == n
+        && certificate.outputs.len() == p
+        && units.all(|&unit| power_of_two(unit) == unit);
+    let dwell_fits = design.dwell.is_some() == (design.spec.lyapunov == Lyapunov::Dwell);
+    require(&[
+        (
+            gains_fit,
+            "the observer's gains do not have the sizes of the plant",
+        ),
+        (
+            matrices_fit,
+            "the observer's Lyapunov matrices do not have the size of the state",
+        ),
+        (
+            dwell_fits,
+            "a dwell time belongs to the dwell guarantee, and to it only",
+        ),
+        (units_fit, "the units are not one power of two per signal"),
+    ])
+}
+
+/// The first condition that fails, as an error.
+fn require(conditions: &[(bool, &str)]) -> Result<(), CertificateError> {
+    match conditions.iter().find(|(holds, _)| !holds) {
+        Some((_, what)) => Err(CertificateError::Malformed((*what).into())),
+        None => Ok(()),
+    }
 }
 
 /// Everything [`verify_state_feedback`] indexes has the size it must have.
@@ -228,7 +399,7 @@ fn check_sizes(plant: &SwitchedPlant, design: &StateFeedback) -> Result<(), Cert
         .as_ref()
         .is_none_or(|gamma| gamma.len() == modes && gamma.iter().all(|g| *g >= 0.0));
     let dwell_fits = design.dwell.is_some() == (spec.lyapunov == Lyapunov::Dwell);
-    for (fits, what) in [
+    require(&[
         (gains_fit, "the gains do not have the sizes of the plant"),
         (
             matrices_fit,
@@ -243,10 +414,5 @@ fn check_sizes(plant: &SwitchedPlant, design: &StateFeedback) -> Result<(), Cert
             certificate.units.fit(plant, r),
             "the units are not one power of two per signal",
         ),
-    ] {
-        if !fits {
-            return Err(malformed(what.into()));
-        }
-    }
-    Ok(())
+    ])
 }

@@ -34,11 +34,37 @@ impl Lyapunov {
         }
     }
 
+    /// Modes (indices from 0) that share a problem: each alone under `dwell`, else all together.
+    pub fn groups(self, modes: usize) -> Vec<Vec<usize>> {
+        match self {
+            Self::Dwell => (0..modes).map(|mode| vec![mode]).collect(),
+            Self::Common | Self::Switched => vec![(0..modes).collect()],
+        }
+    }
+
+    /// The guarantees that ask for less, the strongest first.
+    pub fn weaker(self) -> &'static [Self] {
+        match self {
+            Self::Common => &[Self::Switched, Self::Dwell],
+            Self::Switched => &[Self::Dwell],
+            Self::Dwell => &[],
+        }
+    }
+
     /// The pairs (mode, successor), from 0, whose inequalities must hold.
     pub fn pairs(self, modes: usize) -> Vec<(usize, usize)> {
         match self {
             Self::Common | Self::Dwell => (0..modes).map(|i| (i, i)).collect(),
             Self::Switched => all_pairs(modes),
+        }
+    }
+
+    /// The same for an observer, whose `H` belongs to a pair of modes: a common matrix needs every
+    /// pair as well.
+    pub fn observer_pairs(self, modes: usize) -> Vec<(usize, usize)> {
+        match self {
+            Self::Dwell => self.pairs(modes),
+            Self::Common | Self::Switched => all_pairs(modes),
         }
     }
 }
@@ -72,6 +98,10 @@ pub struct DwellTime {
 }
 
 impl DwellTime {
+    /// Relative amounts by which a computed `mu` is raised, in turn, until it can be proved.
+    #[cfg(feature = "design")]
+    pub(crate) const ALLOWANCES: [f64; 4] = [1e-9, 1e-6, 1e-3, 1.0];
+
     /// From the proved factor `mu >= 1` and decay rate `0 < decay < 1`.
     pub fn new(mu: f64, decay: f64, sample_time: f64) -> Self {
         let samples = (mu.ln() / (-2.0 * decay.ln())).max(0.0);

@@ -1,6 +1,9 @@
 //! The design as a record: plain data, everything the exporter ships and the FMUs read.
 
+use super::Synthesis;
 use crate::control::ControllerParameters;
+use crate::control::parameters::EstimatorMethod;
+use crate::plant::Dimensions;
 use crate::simulate::{Scenario, Truth};
 use serde::{Deserialize, Serialize};
 
@@ -23,6 +26,9 @@ pub struct Design {
     pub truth: Truth,
     /// The experiment the plant FMU plays.
     pub scenario: Scenario,
+    /// What proves the gains; none where they were not made by synthesis.
+    #[serde(default)]
+    pub synthesis: Option<Synthesis>,
 }
 
 /// Descriptions of the plant's signals.
@@ -49,4 +55,99 @@ pub struct Signal {
     pub min: Option<f64>,
     /// Largest value.
     pub max: Option<f64>,
+}
+
+impl Design {
+    /// Whether every part fits the plant, so that nothing on line meets a wrong size.
+    ///
+    /// # Errors
+    /// One sentence that names the first part that does not fit.
+    pub fn check(&self) -> Result<(), String> {
+        if self.format != FORMAT {
+            return Err(format!(
+                "the design has layout {}, but this program reads layout {FORMAT}: export it again",
+                self.format
+            ));
+        }
+        let plant = &self.controller.plant;
+        let dims = Dimensions::check(plant)?;
+        let modes = plant.modes.len();
+        let scenario = &self.scenario;
+        let tracked = &self.controller.feedback.tracked;
+        let predicted = match self.controller.estimator.method {
+            EstimatorMethod::Reference => modes,
+            EstimatorMethod::Sliding | EstimatorMethod::None => {
+                self.controller.estimator.predictors.len()
+            }
+        };
+        for (what, found, needed) in [
+            ("inputs described", self.signals.inputs.len(), dims.inputs),
+            (
+                "outputs described",
+                self.signals.outputs.len(),
+                dims.outputs,
+            ),
+            ("states described", self.signals.states.len(), dims.states),
+            (
+                "modes with feedback gains",
+                self.controller.feedback.modes.len(),
+                modes,
+            ),
+            (
+                "modes with observer gains",
+                self.controller.observer.gains.len(),
+                modes,
+            ),
+            (
+                "modes with a predictor",
+                self.controller.estimator.predictors.len(),
+                predicted,
+            ),
+            (
+                "thresholds",
+                self.controller.estimator.thresholds.len(),
+                dims.outputs,
+            ),
+            (
+                "input limits",
+                self.controller.input_limits.len(),
+                dims.inputs,
+            ),
+            ("noise levels", scenario.noise.len(), dims.outputs),
+            ("references", scenario.reference.len(), tracked.len()),
+            ("faults", scenario.fault.len(), dims.outputs),
+            (
+                "disturbances",
+                scenario.disturbance.len(),
+                dims.disturbances,
+            ),
+        ] {
+            if found != needed {
+                return Err(format!(
+                    "the design has {found} {what}, but its plant needs {needed}"
+                ));
+            }
+        }
+        if tracked.iter().any(|&row| row >= dims.outputs) {
+            return Err(format!(
+                "the design tracks an output beyond its {}",
+                dims.outputs
+            ));
+        }
+        if scenario
+            .schedule
+            .iter()
+            .any(|interval| interval.mode >= modes)
+        {
+            return Err(format!(
+                "the schedule names a mode beyond the plant's {modes}"
+            ));
+        }
+        if let Truth::Linear { plant: truth } = &self.truth
+            && (Dimensions::check(truth)? != dims || truth.modes.len() != modes)
+        {
+            return Err("the true plant has other sizes than the designed one".into());
+        }
+        Ok(())
+    }
 }

@@ -120,7 +120,7 @@ fn check_decay(name: &str, decay: f64, lyapunov: Lyapunov) -> Result<(), String>
 /// Which observer is wanted.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
-pub enum ObserverKind {
+pub enum ObserverChoice {
     /// The unknown input observer where it exists and helps, else the Luenberger observer.
     #[default]
     Auto,
@@ -134,7 +134,7 @@ pub enum ObserverKind {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct ObserverSpec {
     /// Which kind.
-    pub kind: ObserverKind,
+    pub kind: ObserverChoice,
     /// Decay rate `beta` of the estimation error, `0 < beta <= 1`.
     pub decay: f64,
     /// Which guarantee of stability under switching.

@@ -5,13 +5,18 @@
 #[cfg(feature = "design")]
 mod advice;
 #[cfg(feature = "design")]
+mod frame;
+#[cfg(feature = "design")]
 mod synthesis;
+#[cfg(feature = "design")]
+mod theorem;
 
 #[cfg(feature = "design")]
 pub use synthesis::synthesise;
 
 use super::certificate::{self, CertificateError, ControlCertificate};
-use super::{ControlSpec, DwellTime};
+use super::{ControlSpec, DwellTime, pseudo_inverse};
+use crate::control::parameters::{self, FeedbackGains};
 use crate::plant::SwitchedPlant;
 use crate::rows;
 use nalgebra::DMatrix;
@@ -60,5 +65,23 @@ impl StateFeedback {
     /// The first inequality that cannot be proved, or what does not fit.
     pub fn verify(&self, plant: &SwitchedPlant) -> Result<(), CertificateError> {
         certificate::verify_state_feedback(plant, self)
+    }
+
+    /// What the on-line controller needs of it. The anti-windup gain is `G^+`: the integral is
+    /// pulled back to where the clamped command would have come from.
+    pub fn for_controller(&self) -> parameters::StateFeedback {
+        let modes = self.modes.iter().map(|gains| FeedbackGains {
+            state_feedback: gains.state_feedback.clone(),
+            integral: gains.integral.clone(),
+            previous_input: gains.previous_input.clone(),
+            anti_windup: pseudo_inverse(&gains.integral, 1e-12),
+        });
+        parameters::StateFeedback {
+            tracked: self.spec.tracked.clone(),
+            latency: self.spec.latency,
+            resonators: Vec::new(),
+            bumpless: false,
+            modes: modes.collect(),
+        }
     }
 }

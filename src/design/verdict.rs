@@ -1,5 +1,6 @@
 //! Verdicts a person can use: which inequality, what went wrong, what to try.
 
+use super::ControlSpec;
 use serde::{Deserialize, Serialize};
 use std::fmt;
 
@@ -80,6 +81,37 @@ pub enum Advice {
     LyapunovAndDecay(super::Lyapunov, f64),
     /// Track fewer outputs (indices from 0).
     Tracked(Vec<usize>),
+}
+
+impl Advice {
+    /// The request with this advice followed.
+    pub fn apply(&self, spec: &ControlSpec) -> ControlSpec {
+        let mut changed = spec.clone();
+        match self {
+            Self::Decay(decay) => changed.decay = *decay,
+            Self::Lyapunov(lyapunov) => changed.lyapunov = *lyapunov,
+            Self::LyapunovAndDecay(lyapunov, decay) => {
+                changed.lyapunov = *lyapunov;
+                changed.decay = *decay;
+            }
+            Self::Tracked(outputs) => {
+                let kept = |weights: &[f64]| {
+                    let all = spec.tracked.iter().zip(weights);
+                    all.filter(|(output, _)| outputs.contains(output))
+                        .map(|(_, weight)| *weight)
+                        .collect()
+                };
+                changed.output_weight = kept(&spec.output_weight);
+                changed.integral_weight = kept(&spec.integral_weight);
+                changed.tracked.clone_from(outputs);
+            }
+        }
+        changed
+    }
+
+    /// Decay rates that are tried when a faster one is infeasible.
+    #[cfg(feature = "design")]
+    pub(crate) const DECAYS: [f64; 10] = [0.5, 0.6, 0.7, 0.8, 0.9, 0.95, 0.98, 0.99, 0.995, 0.999];
 }
 
 impl fmt::Display for Advice {
@@ -182,4 +214,24 @@ pub enum DesignError {
         "the design could not be certified: {0}; scale the plant by nominal values or ask for a slower decay"
     )]
     Uncertified(#[from] super::CertificateError),
+}
+
+/// The verdict on a conflict: blocks by weight, the heaviest first.
+#[cfg(feature = "design")]
+pub(crate) fn infeasible(
+    margin: f64,
+    weights: Vec<(BlockName, f64)>,
+    advice: Vec<Advice>,
+) -> DesignError {
+    let mut blocks: Vec<ConflictingBlock> = weights
+        .into_iter()
+        .filter(|(_, weight)| *weight > 1e-3)
+        .map(|(name, weight)| ConflictingBlock { name, weight })
+        .collect();
+    blocks.sort_by(|x, y| y.weight.total_cmp(&x.weight));
+    DesignError::Infeasible(Infeasibility {
+        margin: margin.min(0.0),
+        blocks,
+        advice,
+    })
 }

@@ -1,11 +1,11 @@
 //! The closed loop, controller first and then plant: what two coupled FMUs compute.
 
 use super::metrics::{self, Merit};
-use super::plant::{External, PlantSimulator};
+use super::plant::{External, PlantSimulator, PlantState};
 use crate::control::{Compensate, Controller, ControllerState, Sample};
 use serde::Serialize;
 
-/// A way to run the same controller.
+/// Who closes the loop.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Variant {
@@ -15,10 +15,14 @@ pub enum Variant {
     NoFtc,
     /// The same gains, told the true fault: the bound of any estimator.
     ToldTheFault,
+    /// The additive FTC of the paper's section III: gains of Theorem 1, no attenuation.
+    Additive,
+    /// Model predictive control without fault estimation.
+    Predictive,
 }
 
 impl Variant {
-    /// Every variant, in the order they are reported.
+    /// The ways to run one controller, in the order they are reported.
     pub const ALL: [Self; 3] = [Self::Ftc, Self::NoFtc, Self::ToldTheFault];
 
     /// Its name in files.
@@ -27,8 +31,35 @@ impl Variant {
             Self::Ftc => "ftc",
             Self::NoFtc => "no_ftc",
             Self::ToldTheFault => "told_the_fault",
+            Self::Additive => "additive",
+            Self::Predictive => "mpc",
         }
     }
+}
+
+/// Whatever closes the loop: sees the plant's outputs, gives a command.
+pub trait Regulator {
+    /// One tick.
+    fn tick(&mut self, seen: &PlantState);
+    /// Told which input (m) acts over the coming sample.
+    fn advance(&mut self, _seen: &PlantState, _acting: &[f64]) {}
+    /// The command (m).
+    fn command(&self) -> &[f64];
+    /// What else it has to say.
+    fn report(&self) -> Report<'_>;
+}
+
+/// A regulator's inner signals after a tick.
+#[derive(Clone, Copy, Debug)]
+pub struct Report<'a> {
+    /// State estimate (n).
+    pub estimate: &'a [f64],
+    /// Fault estimate (p).
+    pub fault: &'a [f64],
+    /// Residual (p).
+    pub residual: &'a [f64],
+    /// Declared faults (p).
+    pub flagged: &'a [bool],
 }
 
 /// Every signal of one sample.
@@ -82,13 +113,72 @@ pub struct Merits {
     pub truth: Merit,
 }
 
-/// Runs the scenario once. With latency 1 the command computed at a tick acts from the next tick on,
-/// as it does when a master steps both FMUs in parallel.
+/// The tolerant controller in one of its variants.
+struct Tolerant<'a> {
+    controller: &'a Controller,
+    state: ControllerState,
+    variant: Variant,
+}
+
+impl Regulator for Tolerant<'_> {
+    fn tick(&mut self, seen: &PlantState) {
+        let compensate = match self.variant {
+            Variant::NoFtc => Compensate::Nothing,
+            Variant::ToldTheFault => Compensate::Known(&seen.fault),
+            _ => Compensate::Estimate,
+        };
+        let sample = Sample {
+            tick: seen.tick,
+            mode: seen.mode,
+            measurement: &seen.y,
+            reference: &seen.reference,
+            thresholds: &self.controller.parameters().estimator.thresholds,
+            compensate,
+        };
+        self.controller.tick(&mut self.state, &sample);
+    }
+
+    fn command(&self) -> &[f64] {
+        &self.state.command
+    }
+
+    fn report(&self) -> Report<'_> {
+        let estimator = &self.state.estimator;
+        Report {
+            estimate: &self.state.observer.estimate,
+            fault: &estimator.fault,
+            residual: &estimator.residual,
+            flagged: &estimator.flagged,
+        }
+    }
+}
+
+/// Runs the scenario once with the tolerant controller. With latency 1 the command computed at a
+/// tick acts from the next tick on, as it does when a master steps both FMUs in parallel.
 pub fn run(plant: &PlantSimulator, controller: &Controller, variant: Variant) -> Trajectory {
-    let mut state = plant.initial_state();
-    let mut memory = controller.initial_state(state.mode);
-    let mut acting = memory.command.clone();
+    let state = controller.initial_state(plant.initial_state().mode);
     let delayed = controller.parameters().feedback.latency > 0;
+    run_with(
+        plant,
+        &mut Tolerant {
+            controller,
+            state,
+            variant,
+        },
+        variant,
+        delayed,
+    )
+}
+
+/// Runs the scenario once with any regulator; `delayed` commands act one tick later.
+pub fn run_with(
+    plant: &PlantSimulator,
+    regulator: &mut dyn Regulator,
+    variant: Variant,
+    delayed: bool,
+) -> Trajectory {
+    let mut state = plant.initial_state();
+    let mut acting = regulator.command().to_vec();
     let silent_fault = vec![0.0; state.y.len()];
     let silent_disturbance = vec![0.0; state.disturbance.len()];
     let external = External {
@@ -98,35 +188,22 @@ pub fn run(plant: &PlantSimulator, controller: &Controller, variant: Variant) ->
         noise: true,
     };
     let mut records = Vec::with_capacity(plant.scenario().steps as usize);
-    for tick in 0..plant.scenario().steps {
+    for _ in 0..plant.scenario().steps {
         plant.observe(&mut state, &external);
-        let compensate = match variant {
-            Variant::Ftc => Compensate::Estimate,
-            Variant::NoFtc => Compensate::Nothing,
-            Variant::ToldTheFault => Compensate::Known(&state.fault),
-        };
-        controller.tick(
-            &mut memory,
-            &Sample {
-                tick,
-                mode: state.mode,
-                measurement: &state.y,
-                reference: &state.reference,
-                thresholds: &controller.parameters().estimator.thresholds,
-                compensate,
-            },
-        );
-        records.push(record(&state, &memory));
+        regulator.tick(&state);
+        records.push(record(&state, regulator));
         if !delayed {
-            acting.clone_from(&memory.command);
+            acting.copy_from_slice(regulator.command());
         }
+        regulator.advance(&state, &acting);
         plant.advance(&mut state, &acting);
-        acting.clone_from(&memory.command);
+        acting.copy_from_slice(regulator.command());
     }
     Trajectory { variant, records }
 }
 
-fn record(plant: &super::PlantState, controller: &ControllerState) -> Record {
+fn record(plant: &PlantState, regulator: &dyn Regulator) -> Record {
+    let report = regulator.report();
     Record {
         tick: plant.tick,
         mode: plant.mode,
@@ -137,11 +214,11 @@ fn record(plant: &super::PlantState, controller: &ControllerState) -> Record {
         y: plant.y.clone(),
         y_true: plant.y_true.clone(),
         x: plant.x.clone(),
-        u: controller.command.clone(),
-        x_hat: controller.observer.estimate.clone(),
-        f_hat: controller.estimator.fault.clone(),
-        residual: controller.estimator.residual.clone(),
-        flagged: controller.estimator.flagged.clone(),
+        u: regulator.command().to_vec(),
+        x_hat: report.estimate.to_vec(),
+        f_hat: report.fault.to_vec(),
+        residual: report.residual.to_vec(),
+        flagged: report.flagged.to_vec(),
     }
 }
 

@@ -1,5 +1,6 @@
 //! Trying the loop before trusting it: a plant under a scenario, the closed loop, its figures of merit.
 
+pub mod baselines;
 pub mod closed_loop;
 pub mod integrate;
 pub mod metrics;
@@ -8,7 +9,7 @@ pub mod plant;
 pub mod scenario;
 pub mod truth;
 
-pub use closed_loop::{Trajectory, Variant, run};
+pub use closed_loop::{Trajectory, Variant, run, run_with};
 pub use plant::{PlantSimulator, PlantState};
 pub use scenario::Scenario;
 pub use truth::Truth;

@@ -100,8 +100,12 @@ impl PlantSimulator {
 
     /// At rest in the scenario's first mode, tick 0, outputs not yet observed.
     pub fn initial_state(&self) -> PlantState {
+        self.initial_state_in(self.scenario.mode(0, self.plant.sample_time))
+    }
+
+    /// At rest at the operating point of `mode` (0-based), tick 0, outputs not yet observed.
+    pub fn initial_state_in(&self, mode: usize) -> PlantState {
         let dims = self.plant.dimensions();
-        let mode = self.scenario.mode(0, self.plant.sample_time);
         let point = &self.plant.modes[mode].operating_point;
         PlantState {
             tick: 0,

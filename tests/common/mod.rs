@@ -146,6 +146,8 @@ pub fn controller(channel: Channel, noise: f64) -> ControllerParameters {
         feedback: StateFeedback {
             tracked: vec![0, 1],
             latency: 0,
+            resonators: vec![],
+            bumpless: false,
             modes: vec![
                 gains(
                     dmatrix![0.199, -0.827; -1.125, -0.447],
@@ -172,12 +174,18 @@ pub fn controller(channel: Channel, noise: f64) -> ControllerParameters {
             response_length: length,
             window: 2 * (length + 1) + 20,
             predictors,
+            adapt: false,
             harmonics: Some(Harmonics {
                 period: core::f64::consts::TAU / 0.02,
                 count: 1,
                 memory: 3000.0,
                 initial_variance: 1e6,
             }),
+            harmonic_transfers: ftc::design::harmonics::transfers(
+                &plant,
+                core::f64::consts::TAU / 0.02,
+                1,
+            ),
             thresholds,
             debounce: 1,
             leverage_limit: 100.0,

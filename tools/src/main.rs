@@ -1,5 +1,152 @@
-//! Command line.
-#[allow(dead_code, unused_imports)]
-mod report;
+//! `ftc-fmu`: from a design file to a certified controller, its FMUs and its simulation.
+//!
+//! ```text
+//! DESIGN.toml ── design_file ──> assemble ──> ftc::design ──┬─> report   (design)
+//!                                                           ├─> export   (two FMUs)
+//!                                                           └─> simulate (trajectories, metrics)
+//! ```
 
-fn main() {}
+mod assemble;
+mod design_file;
+mod export;
+mod failure;
+mod output;
+mod progress;
+mod report;
+mod simulate;
+mod summary;
+
+use clap::{Parser, Subcommand};
+use failure::Failure;
+use ftc::design::Design;
+use progress::Progress;
+use std::io::Write;
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+
+/// Design, certify, export and simulate sensor-fault-tolerant controllers for switched linear plants.
+///
+/// A design file (TOML) describes the plant, what the controller shall do and an experiment;
+/// start from one of those in examples/.
+#[derive(Parser)]
+#[command(version, after_help = EXIT_CODES)]
+struct Arguments {
+    #[command(subcommand)]
+    command: Command,
+    /// Print nothing but errors.
+    #[arg(long, global = true)]
+    quiet: bool,
+}
+
+const EXIT_CODES: &str = "\
+Exit codes:
+  0  done
+  1  there is no such controller: the design is infeasible or could not be certified
+  2  the command line, the design file or the output directory is at fault; nothing was written";
+
+#[derive(Subcommand)]
+enum Command {
+    /// Solve for the gains, certify them and print the report.
+    ///
+    /// The report tells per mode the attenuation gamma from the disturbance to the weighted
+    /// outputs, tracking-error integrals and inputs, and the spectral radius of the closed loop;
+    /// then the observer, how well the fault estimator's predictor fits, and what is certified.
+    #[command(after_help = EXIT_CODES)]
+    Design {
+        /// Design file (TOML).
+        design: PathBuf,
+        /// Print one JSON object instead, also when there is no such controller.
+        #[arg(long)]
+        json: bool,
+    },
+    /// Write NAME_controller.fmu and NAME_plant.fmu (FMI 2.0, co-simulation).
+    ///
+    /// The two close the loop: connect y, y_ref and mode from the plant to the controller, and u
+    /// back; step the controller first. The same design always gives the same bytes.
+    #[command(after_help = EXIT_CODES)]
+    Export {
+        /// Design file (TOML).
+        design: PathBuf,
+        /// Directory to write to; made if it does not exist.
+        #[arg(long, value_name = "DIR")]
+        out: PathBuf,
+    },
+    /// Run the design's scenario without any FMU: trajectories.csv, metrics.json, report.html and figures.
+    ///
+    /// Runs it three times: with fault tolerance (ftc), with the same gains believing every
+    /// sensor (no_ftc), and with the same gains told the true fault (told_the_fault), which no
+    /// estimator can beat.
+    #[command(after_help = EXIT_CODES)]
+    Simulate {
+        /// Design file (TOML).
+        design: PathBuf,
+        /// Directory to write to; made if it does not exist.
+        #[arg(long, value_name = "DIR")]
+        out: PathBuf,
+    },
+}
+
+fn main() -> ExitCode {
+    let arguments = Arguments::parse();
+    match run(&arguments) {
+        Ok(text) => {
+            if !arguments.quiet {
+                print(&text);
+            }
+            ExitCode::SUCCESS
+        }
+        Err(failure) => {
+            if let Some(text) = failure.output() {
+                print(text);
+            }
+            eprintln!("error: {failure}");
+            failure.exit_code()
+        }
+    }
+}
+
+/// Runs the command and returns what to print.
+fn run(arguments: &Arguments) -> Result<String, Failure> {
+    let progress = Progress::new(arguments.quiet);
+    match &arguments.command {
+        Command::Design {
+            design,
+            json: false,
+        } => Ok(summary::text(&solve(design, &progress)?)),
+        Command::Design { design, json: true } => match solve(design, &progress) {
+            Ok(design) => Ok(summary::json(&design)),
+            Err(failure) => Err(failure.explained_in_json()),
+        },
+        Command::Export { design, out } => {
+            let staging = output::Staging::new(out).map_err(Failure::Input)?;
+            let design = solve(design, &progress)?;
+            export::write(&design, staging).map_err(Failure::Input)
+        }
+        Command::Simulate { design, out } => {
+            let staging = output::Staging::new(out).map_err(Failure::Input)?;
+            let design = solve(design, &progress)?;
+            progress.tell("simulating");
+            simulate::write(&design, staging).map_err(Failure::Input)
+        }
+    }
+}
+
+/// Reads a design file and makes the design.
+fn solve(path: &Path, progress: &Progress) -> Result<Design, Failure> {
+    progress.tell("reading the design file");
+    let file = design_file::read(path).map_err(Failure::Input)?;
+    let folder = path.parent().unwrap_or(Path::new(""));
+    let request = assemble::request(&file, folder)
+        .map_err(|what| Failure::Input(format!("{}: {what}", path.display())))?;
+    let asked = request.control.clone();
+    progress.tell("solving for gains and certifying them");
+    ftc::design::assembly::assemble(request).map_err(|error| Failure::new(path, asked, error))
+}
+
+/// Prints to standard output; a reader that has gone away is no error of ours.
+fn print(text: &str) {
+    let mut out = std::io::stdout().lock();
+    out.write_all(text.as_bytes())
+        .and_then(|()| out.flush())
+        .ok();
+}

@@ -1,1 +1,43 @@
-//! To be filled.
+//! The FMI 2.0 co-simulation interface, written once for every slave.
+//!
+//! An FMU binary of this project is a [`Slave`] (about a hundred lines: load a design, compute
+//! at a tick) and one line that exports the C functions:
+//!
+//! ```text
+//! struct Controller { /* the design, never changed */ }
+//! impl fmu_abi::Slave for Controller { /* ... */ }
+//! fmu_abi::export_fmu!(Controller);
+//! ```
+//!
+//! Everything else is here, in one direction from C to the slave:
+//!
+//! | module | what it decides |
+//! |---|---|
+//! | [`types`] | the C types |
+//! | [`exported`] | pointers, counts, panics: the only unsafe code |
+//! | [`life_cycle`] | which function may be called when: the standard's table |
+//! | [`component`] | what each function does to an instance, in safe code |
+//! | [`clock`] | which ticks a communication step runs |
+//! | [`values`](Values) | the values of the variables, one array |
+//! | [`snapshot`] | what a saved state holds, and its bytes |
+//! | [`resource`] | where the resources lie and whether they belong here |
+//! | [`logger`] | what the importer is told |
+//! | [`slave`](Slave) | the seam |
+//!
+//! The seam lies where the standard's questions end: above it there are strings, pointers,
+//! seconds and states of a protocol, below it a tick number and numbers.
+
+pub mod clock;
+pub mod component;
+mod export;
+pub mod exported;
+pub mod life_cycle;
+pub mod logger;
+pub mod resource;
+mod slave;
+pub mod snapshot;
+pub mod types;
+mod values;
+
+pub use slave::{Refusal, Slave, require_finite, selected_mode};
+pub use values::Values;

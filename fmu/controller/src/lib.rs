@@ -1,1 +1,150 @@
-//! The controller FMU.
+//! The controller FMU: a [`Slave`] over [`ftc::control`].
+//!
+//! The binary is generic; `resources/design.json` makes it the controller of one plant. It works
+//! when a tick begins: it samples the measurements and publishes the command at once, so a master
+//! that steps the controller before the plant adds no delay to the loop.
+
+use fmu_abi::{Refusal, Slave, Values, require_finite, resource, selected_mode};
+use ftc::control::{Compensate, Controller, ControllerState, Sample};
+use ftc::design::Design;
+use model_description::{CONTROLLER, Interface, Role, Span, VariableTable};
+use std::path::Path;
+
+fmu_abi::export_fmu!(ControllerFmu);
+
+/// A controller and where its signals lie.
+pub struct ControllerFmu {
+    controller: Controller,
+    table: VariableTable,
+    spans: Spans,
+    /// Mode (0-based) a fresh instance rests in.
+    first_mode: usize,
+}
+
+struct Spans {
+    measurement: Span,
+    reference: Span,
+    mode: Span,
+    mode_real: Span,
+    ftc_enabled: Span,
+    threshold: Span,
+    command: Span,
+    state_estimate: Span,
+    fault_estimate: Span,
+    residual: Span,
+    fault_flag: Span,
+}
+
+impl Spans {
+    fn of(table: &VariableTable) -> Self {
+        Self {
+            measurement: table.span(Role::Measurement),
+            reference: table.span(Role::Reference),
+            mode: table.span(Role::Mode),
+            mode_real: table.span(Role::ModeReal),
+            ftc_enabled: table.span(Role::FtcEnabled),
+            threshold: table.span(Role::Threshold),
+            command: table.span(Role::Command),
+            state_estimate: table.span(Role::StateEstimate),
+            fault_estimate: table.span(Role::FaultEstimate),
+            residual: table.span(Role::Residual),
+            fault_flag: table.span(Role::FaultFlag),
+        }
+    }
+}
+
+impl ControllerFmu {
+    /// The active mode (0-based).
+    fn mode(&self, values: &Values) -> Result<usize, Refusal> {
+        let modes = self.controller.parameters().plant.modes.len();
+        selected_mode(
+            &self.table,
+            values,
+            self.spans.mode,
+            self.spans.mode_real,
+            modes,
+        )
+    }
+
+    fn publish(&self, state: &ControllerState, values: &mut Values) {
+        let spans = &self.spans;
+        values.set(spans.command, &state.command);
+        values.set(spans.state_estimate, &state.observer.estimate);
+        values.set(spans.fault_estimate, &state.estimator.fault);
+        values.set(spans.residual, &state.estimator.residual);
+        for (slot, &flagged) in values
+            .get_mut(spans.fault_flag)
+            .iter_mut()
+            .zip(&state.estimator.flagged)
+        {
+            *slot = f64::from(u8::from(flagged));
+        }
+    }
+}
+
+impl Slave for ControllerFmu {
+    type State = ControllerState;
+
+    fn load(resources: &Path, guid: &str) -> Result<Self, String> {
+        let bytes = resource::read_verified(resources, "design.json", CONTROLLER, guid)?;
+        let design: Design =
+            serde_json::from_slice(&bytes).map_err(|why| format!("design.json: {why}"))?;
+        design
+            .check()
+            .map_err(|why| format!("design.json: {why}"))?;
+        let table = model_description::controller(&Interface::from(&design));
+        Ok(Self {
+            first_mode: design.scenario.mode(0, design.controller.plant.sample_time),
+            spans: Spans::of(&table),
+            controller: Controller::new(design.controller),
+            table,
+        })
+    }
+
+    fn variables(&self) -> &VariableTable {
+        &self.table
+    }
+
+    fn sample_time(&self) -> f64 {
+        self.controller.parameters().plant.sample_time
+    }
+
+    fn initial_state(&self) -> ControllerState {
+        self.controller.initial_state(self.first_mode)
+    }
+
+    fn initialize(&self, state: &mut ControllerState, values: &mut Values) -> Result<(), Refusal> {
+        *state = self.controller.initial_state(self.mode(values)?);
+        self.publish(state, values);
+        Ok(())
+    }
+
+    fn check_inputs(&self, values: &Values) -> Result<(), Refusal> {
+        require_finite(&self.table, values, self.spans.reference)?;
+        require_finite(&self.table, values, self.spans.threshold)?;
+        self.mode(values).map(drop)
+    }
+
+    fn begin_tick(
+        &self,
+        state: &mut ControllerState,
+        values: &mut Values,
+        k: u64,
+    ) -> Result<(), Refusal> {
+        let sample = Sample {
+            tick: k,
+            mode: self.mode(values)?,
+            measurement: values.get(self.spans.measurement),
+            reference: values.get(self.spans.reference),
+            thresholds: values.get(self.spans.threshold),
+            compensate: if values.flag(self.spans.ftc_enabled) {
+                Compensate::Estimate
+            } else {
+                Compensate::Nothing
+            },
+        };
+        self.controller.tick(state, &sample);
+        self.publish(state, values);
+        Ok(())
+    }
+}

@@ -1,1 +1,175 @@
-//! The plant FMU.
+//! The plant FMU: a [`Slave`] over [`ftc::simulate::PlantSimulator`], to try the controller against.
+//!
+//! It latches its inputs when a tick begins and publishes what they lead to when the tick ends,
+//! so its outputs at a communication point are those of that very instant, whatever the step.
+//! With `scenario_enabled` it also plays the design's experiment: mode schedule, references,
+//! faults, disturbance and noise.
+
+use fmu_abi::{Refusal, Slave, Values, require_finite, resource, selected_mode};
+use ftc::design::Design;
+use ftc::simulate::plant::External;
+use ftc::simulate::{PlantSimulator, PlantState};
+use model_description::{Interface, PLANT, Role, Span, VariableTable};
+use std::path::Path;
+
+fmu_abi::export_fmu!(PlantFmu);
+
+/// A plant and where its signals lie.
+pub struct PlantFmu {
+    simulator: PlantSimulator,
+    table: VariableTable,
+    spans: Spans,
+}
+
+struct Spans {
+    command: Span,
+    external_fault: Span,
+    external_disturbance: Span,
+    external_mode: Span,
+    external_mode_real: Span,
+    measurement: Span,
+    true_output: Span,
+    state: Span,
+    reference: Span,
+    mode: Span,
+    mode_real: Span,
+    fault: Span,
+    disturbance: Span,
+    scenario_enabled: Span,
+    noise_enabled: Span,
+}
+
+impl Spans {
+    fn of(table: &VariableTable) -> Self {
+        Self {
+            command: table.span(Role::Command),
+            external_fault: table.span(Role::ExternalFault),
+            external_disturbance: table.span(Role::ExternalDisturbance),
+            external_mode: table.span(Role::ExternalMode),
+            external_mode_real: table.span(Role::ExternalModeReal),
+            measurement: table.span(Role::Measurement),
+            true_output: table.span(Role::TrueOutput),
+            state: table.span(Role::State),
+            reference: table.span(Role::Reference),
+            mode: table.span(Role::Mode),
+            mode_real: table.span(Role::ModeReal),
+            fault: table.span(Role::Fault),
+            disturbance: table.span(Role::Disturbance),
+            scenario_enabled: table.span(Role::ScenarioEnabled),
+            noise_enabled: table.span(Role::NoiseEnabled),
+        }
+    }
+}
+
+impl PlantFmu {
+    /// The mode (0-based) from outside while the scenario is off.
+    fn external_mode(&self, values: &Values) -> Result<Option<usize>, Refusal> {
+        if values.flag(self.spans.scenario_enabled) {
+            return Ok(None);
+        }
+        let modes = self.simulator.plant().modes.len();
+        let spans = &self.spans;
+        selected_mode(
+            &self.table,
+            values,
+            spans.external_mode,
+            spans.external_mode_real,
+            modes,
+        )
+        .map(Some)
+    }
+
+    fn external<'a>(&self, values: &'a Values) -> Result<External<'a>, Refusal> {
+        Ok(External {
+            fault: values.get(self.spans.external_fault),
+            disturbance: values.get(self.spans.external_disturbance),
+            mode: self.external_mode(values)?,
+            noise: values.flag(self.spans.noise_enabled),
+        })
+    }
+
+    /// Observes the present tick and publishes every output.
+    fn publish(&self, state: &mut PlantState, values: &mut Values) -> Result<(), Refusal> {
+        self.simulator.observe(state, &self.external(values)?);
+        let spans = &self.spans;
+        values.set(spans.measurement, &state.y);
+        values.set(spans.true_output, &state.y_true);
+        values.set(spans.state, &state.x);
+        values.set(spans.reference, &state.reference);
+        values.set(spans.fault, &state.fault);
+        values.set(spans.disturbance, &state.disturbance);
+        let number = [(state.mode + 1) as f64];
+        values.set(spans.mode, &number);
+        values.set(spans.mode_real, &number);
+        Ok(())
+    }
+}
+
+impl Slave for PlantFmu {
+    type State = PlantState;
+
+    fn load(resources: &Path, guid: &str) -> Result<Self, String> {
+        let bytes = resource::read_verified(resources, "design.json", PLANT, guid)?;
+        let design: Design =
+            serde_json::from_slice(&bytes).map_err(|why| format!("design.json: {why}"))?;
+        design
+            .check()
+            .map_err(|why| format!("design.json: {why}"))?;
+        let table = model_description::plant(&Interface::from(&design));
+        Ok(Self {
+            spans: Spans::of(&table),
+            simulator: PlantSimulator::with_truth(
+                design.controller.plant,
+                design.truth,
+                design.scenario,
+            ),
+            table,
+        })
+    }
+
+    fn variables(&self) -> &VariableTable {
+        &self.table
+    }
+
+    fn sample_time(&self) -> f64 {
+        self.simulator.plant().sample_time
+    }
+
+    fn initial_state(&self) -> PlantState {
+        self.simulator.initial_state()
+    }
+
+    fn initialize(&self, state: &mut PlantState, values: &mut Values) -> Result<(), Refusal> {
+        if let Some(mode) = self.external_mode(values)? {
+            *state = self.simulator.initial_state_in(mode);
+        }
+        self.publish(state, values)
+    }
+
+    fn check_inputs(&self, values: &Values) -> Result<(), Refusal> {
+        require_finite(&self.table, values, self.spans.command)?;
+        require_finite(&self.table, values, self.spans.external_disturbance)?;
+        self.external_mode(values).map(drop)
+    }
+
+    fn begin_tick(
+        &self,
+        state: &mut PlantState,
+        values: &mut Values,
+        _k: u64,
+    ) -> Result<(), Refusal> {
+        self.simulator.observe(state, &self.external(values)?);
+        self.simulator
+            .advance(state, values.get(self.spans.command));
+        Ok(())
+    }
+
+    fn end_tick(
+        &self,
+        state: &mut PlantState,
+        values: &mut Values,
+        _k: u64,
+    ) -> Result<(), Refusal> {
+        self.publish(state, values)
+    }
+}

@@ -6,7 +6,7 @@
 //! declared nothing is learned and the last coefficients extrapolate.
 
 use crate::control::kernel;
-use crate::control::parameters::Harmonics;
+use crate::control::parameters::{Harmonics, PhasorMap};
 use serde::{Deserialize, Serialize};
 
 /// Learned coefficients of one mode, with `q = 2 x harmonics` regressors.
@@ -20,7 +20,15 @@ pub struct HarmonicState {
     regressor: Vec<f64>,
     /// Covariance times regressor (q).
     direction: Vec<f64>,
+    /// Samples learned from.
+    samples: u64,
 }
+
+/// Samples per coefficient before a response counts as known.
+const SAMPLES_PER_COEFFICIENT: u64 = 4;
+
+/// How far a response carried over from another mode may be wrong, relative to its size.
+const TRANSFER_ERROR: f64 = 0.1;
 
 impl HarmonicState {
     /// Nothing learned yet.
@@ -36,6 +44,7 @@ impl HarmonicState {
             covariance,
             regressor: vec![0.0; size],
             direction: vec![0.0; size],
+            samples: 0,
         }
     }
 
@@ -71,9 +80,59 @@ impl HarmonicState {
         kernel::dot(&self.direction, &self.regressor).max(0.0)
     }
 
+    /// Whether enough was learned to say something of another mode.
+    pub fn is_known(&self) -> bool {
+        self.samples >= SAMPLES_PER_COEFFICIENT * self.regressor.len() as u64
+    }
+
+    /// Whether a whole period has been learned from.
+    pub fn is_settled(&self, harmonics: &Harmonics) -> bool {
+        self.samples as f64 >= harmonics.period
+    }
+
+    /// Starts from what `other` learned in another mode; `deviations` (p) are the sensors' noise levels.
+    pub fn carry_over(
+        &mut self,
+        other: &Self,
+        maps: &[PhasorMap],
+        deviations: impl Iterator<Item = f64> + Clone,
+    ) {
+        let size = self.regressor.len().max(1);
+        self.coefficients.fill(0.0);
+        for (harmonic, map) in maps.iter().enumerate() {
+            let (sine, cosine) = (2 * harmonic, 2 * harmonic + 1);
+            for (row, to) in self.coefficients.chunks_exact_mut(size).enumerate() {
+                for (column, from) in other.coefficients.chunks_exact(size).enumerate() {
+                    let (Some(&re), Some(&im)) = (
+                        map.real.get((row, column)),
+                        map.imaginary.get((row, column)),
+                    ) else {
+                        continue;
+                    };
+                    if let (Some(&a), Some(&b)) = (from.get(sine), from.get(cosine)) {
+                        add_at(to, sine, re * a - im * b);
+                        add_at(to, cosine, im * a + re * b);
+                    }
+                }
+            }
+        }
+        kernel::bound(&mut self.coefficients);
+        let rows = self.coefficients.chunks_exact(size).zip(deviations);
+        let doubt = rows
+            .map(|(row, deviation)| TRANSFER_ERROR * libm::sqrt(kernel::dot(row, row)) / deviation)
+            .fold(0.0, f64::max);
+        kernel::copy(&mut self.covariance, &other.covariance);
+        let variance = kernel::bounded(doubt * doubt);
+        self.covariance
+            .iter_mut()
+            .step_by(size + 1)
+            .for_each(|v| *v = kernel::bounded(*v + variance));
+    }
+
     /// One step of recursive least squares on the residuals (p) of a healthy sample.
     /// Call [`rotate`](Self::rotate) and [`leverage`](Self::leverage) of the same tick first.
     pub fn learn(&mut self, harmonics: &Harmonics, residual: &[f64]) {
+        self.samples = self.samples.saturating_add(1);
         let size = self.regressor.len().max(1);
         let keep = 1.0 - 1.0 / harmonics.memory.max(2.0);
         let scale = 1.0 / (keep + kernel::dot(&self.direction, &self.regressor).max(0.0));
@@ -85,6 +144,13 @@ impl HarmonicState {
             kernel::add_scaled(row, -scale * factor, &self.direction);
             row.iter_mut().for_each(|v| *v = kernel::bounded(*v / keep));
         }
+    }
+}
+
+/// Adds to one entry of a slice.
+fn add_at(values: &mut [f64], index: usize, amount: f64) {
+    if let Some(value) = values.get_mut(index) {
+        *value += amount;
     }
 }
 

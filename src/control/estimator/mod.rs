@@ -6,11 +6,13 @@
 //! is judged against its own threshold ([`decision`]), widened by how far the present input lies
 //! from those the database knows.
 
+mod adaptation;
 mod decision;
 mod harmonics;
 mod predictor;
 mod window;
 
+pub use adaptation::Adaptation;
 pub use decision::{Decision, Verdict};
 pub use harmonics::HarmonicState;
 pub use predictor::{InputHistory, leverage};
@@ -20,6 +22,9 @@ use super::compensation::is_measurement;
 use super::kernel;
 use super::parameters::{Estimator, EstimatorMethod};
 use serde::{Deserialize, Serialize};
+
+/// How many noise deviations a threshold usually is.
+const USUAL_SIGMAS: f64 = 6.0;
 
 /// One sample as the estimator sees it.
 #[derive(Clone, Copy, Debug)]
@@ -46,6 +51,8 @@ pub struct EstimatorState {
     hold: usize,
     /// Per mode: the learned response to the periodic disturbance.
     harmonics: Vec<HarmonicState>,
+    /// Per mode: the adapted response; empty unless adaptation is on.
+    adaptations: Vec<Adaptation>,
     decisions: Vec<Decision>,
     /// The window of the printed method, where it is chosen.
     window: Option<SlidingWindow>,
@@ -75,6 +82,11 @@ impl EstimatorState {
             history: InputHistory::new(inputs, estimator.response_length),
             hold: estimator.response_length,
             harmonics,
+            adaptations: if estimator.adapt {
+                estimator.predictors.iter().map(Adaptation::new).collect()
+            } else {
+                Vec::new()
+            },
             window: (estimator.method == EstimatorMethod::Sliding).then(|| {
                 SlidingWindow::new(
                     inputs.len() * estimator.response_length,
@@ -90,11 +102,32 @@ impl EstimatorState {
         }
     }
 
-    /// Called on entering a mode: the regressor mixes modes for `response_length` samples.
-    pub fn mode_entered(&mut self, estimator: &Estimator) {
+    /// Called on leaving mode `from` for mode `to`: the regressor mixes modes for `response_length`
+    /// samples, and a mode never learned in starts from what the other taught.
+    pub fn mode_entered(
+        &mut self,
+        estimator: &Estimator,
+        from: usize,
+        to: usize,
+        thresholds: &[f64],
+    ) {
         self.hold = estimator.response_length;
         if let Some(window) = &mut self.window {
             window.clear();
+        }
+        let maps = estimator
+            .harmonic_transfers
+            .get(from)
+            .and_then(|row| row.get(to));
+        if let Some(maps) = maps
+            && let Ok([left, entered]) = self.harmonics.get_disjoint_mut([from, to])
+            && left.is_known()
+            && !entered.is_known()
+        {
+            let deviations = thresholds
+                .iter()
+                .map(|t| (t / USUAL_SIGMAS).max(f64::MIN_POSITIVE));
+            entered.carry_over(left, maps, deviations);
         }
     }
 
@@ -112,11 +145,8 @@ impl EstimatorState {
             EstimatorMethod::None => None,
         };
         let healthy = self.decide(estimator, seen, widening);
-        if healthy
-            && let Some(learned) = self.harmonics.get_mut(seen.mode)
-            && let Some(known) = &estimator.harmonics
-        {
-            learned.learn(known, &self.residual);
+        if healthy {
+            self.learn(estimator, seen.mode);
         }
         self.hold = self.hold.saturating_sub(1);
     }
@@ -131,6 +161,9 @@ impl EstimatorState {
             &predictor.response,
             self.history.regressor(),
         );
+        if let Some(adaptation) = self.adaptations.get_mut(seen.mode) {
+            adaptation.improve(self.history.regressor(), &mut self.prediction);
+        }
         let leverage = self.history.leverage(&predictor.factor);
         let mut spread = 1.0 + leverage;
         if let Some(learned) = self.harmonics.get_mut(seen.mode)
@@ -147,8 +180,28 @@ impl EstimatorState {
                 *residual = value - predicted;
             }
         }
-        let trusted = self.hold == 0 && leverage <= estimator.leverage_limit;
+        // What was not learned cannot clear a fault that is declared.
+        let uncertain = spread > 1.0 + estimator.leverage_limit && self.flagged.contains(&true);
+        let trusted = self.hold == 0 && leverage <= estimator.leverage_limit && !uncertain;
         trusted.then(|| libm::sqrt(spread))
+    }
+
+    /// Takes a healthy sample in: the response to the disturbance first, the plant's own response
+    /// only once the former is known, since the loop's input follows the disturbance too.
+    fn learn(&mut self, estimator: &Estimator, mode: usize) {
+        let mut settled = true;
+        if let Some(learned) = self.harmonics.get_mut(mode)
+            && let Some(known) = &estimator.harmonics
+        {
+            settled = learned.is_settled(known);
+            learned.learn(known, &self.residual);
+        }
+        if settled
+            && let Some(adaptation) = self.adaptations.get_mut(mode)
+            && let Some(predictor) = estimator.predictors.get(mode)
+        {
+            adaptation.learn(predictor, self.history.regressor(), &self.residual);
+        }
     }
 
     /// The sliding window as printed: leaves the residual; nothing until the window is full.

@@ -48,6 +48,12 @@ impl Enclosure {
         }
     }
 
+    /// The midpoint, when the radius no longer matters.
+    #[cfg(feature = "design")]
+    pub(crate) fn into_midpoint(self) -> DMatrix<f64> {
+        self.mid
+    }
+
     /// Rows and columns.
     pub fn shape(&self) -> (usize, usize) {
         self.mid.shape()

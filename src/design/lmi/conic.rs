@@ -6,7 +6,7 @@ use crate::design::verdict::SolverFailure;
 use clarabel::algebra::CscMatrix;
 use clarabel::solver::{
     DefaultSettings, DefaultSolver, IPSolver, SolverStatus, SupportedConeT,
-    SupportedConeT::{PSDTriangleConeT, ZeroConeT},
+    SupportedConeT::{NonnegativeConeT, PSDTriangleConeT, ZeroConeT},
 };
 use ftc_lapack as _;
 use std::collections::BTreeMap;
@@ -40,14 +40,25 @@ impl Conic {
     }
 
     /// Adds `expression = 0` (1 x 1).
-    pub(super) fn equation(&mut self, expression: &Affine) {
+    pub(super) fn zero(&mut self, expression: &Affine) {
+        self.single(expression);
+        self.cones.push(ZeroConeT(1));
+    }
+
+    /// Adds `expression >= 0` (1 x 1).
+    pub(super) fn nonnegative(&mut self, expression: &Affine) {
+        self.single(expression);
+        self.cones.push(NonnegativeConeT(1));
+    }
+
+    /// One row for a 1 x 1 expression.
+    fn single(&mut self, expression: &Affine) {
         let row = self.constants.len();
         self.constants.push(expression.constant(0, 0));
         let columns = &mut self.columns;
         expression.for_each_coefficient(|scalar, _, _, value| {
             *columns[scalar].entry(row).or_default() -= value;
         });
-        self.cones.push(ZeroConeT(1));
     }
 
     /// Adds `inequality >= t I`, with `t` the scalar `margin` (zero when absent).
@@ -189,7 +200,7 @@ fn traces(cones: &[SupportedConeT<f64>], dual: &[f64]) -> Vec<f64> {
                 traces.push(trace);
                 first += size * (size + 1) / 2;
             }
-            ZeroConeT(size) => first += size,
+            ZeroConeT(size) | NonnegativeConeT(size) => first += size,
             _ => {}
         }
     }

@@ -67,6 +67,7 @@ pub struct Problem {
     scalars: usize,
     inequalities: Vec<Inequality>,
     equations: Vec<Affine>,
+    bounds: Vec<Affine>,
 }
 
 /// What the solver came back with: to be judged, not trusted.
@@ -124,15 +125,12 @@ impl Problem {
 
     /// Demands that the sum of the diagonals of these square expressions equal `value`.
     pub fn require_trace(&mut self, expressions: &[Affine], value: f64) {
-        let mut sum = Affine::from(DMatrix::from_element(1, 1, -value));
-        for expression in expressions {
-            let size = expression.shape().0;
-            for i in 0..size {
-                let unit = DMatrix::from_fn(size, 1, |r, _| f64::from(u8::from(r == i)));
-                sum = sum + &unit.transpose() * expression.clone() * &unit;
-            }
-        }
-        self.equations.push(sum);
+        self.equations.push(trace(expressions) - number(value));
+    }
+
+    /// Demands that the sum of the diagonals of these square expressions be at most `value`.
+    pub fn require_trace_below(&mut self, expressions: &[Affine], value: f64) {
+        self.bounds.push(number(value) - trace(expressions));
     }
 
     /// Minimises an unknown number.
@@ -176,11 +174,32 @@ impl Problem {
     fn conic(&self, margin: Option<usize>) -> Conic {
         let mut conic = conic::Conic::new(self.scalars + usize::from(margin.is_some()));
         for equation in &self.equations {
-            conic.equation(equation);
+            conic.zero(equation);
+        }
+        for bound in &self.bounds {
+            conic.nonnegative(bound);
         }
         for inequality in &self.inequalities {
             conic.semidefinite(inequality, margin);
         }
         conic
     }
+}
+
+/// A constant number as an expression.
+fn number(value: f64) -> Affine {
+    DMatrix::from_element(1, 1, value).into()
+}
+
+/// The sum of all diagonals, 1 x 1.
+fn trace(expressions: &[Affine]) -> Affine {
+    let mut sum = number(0.0);
+    for expression in expressions {
+        let size = expression.shape().0;
+        for i in 0..size {
+            let unit = DMatrix::from_fn(size, 1, |r, _| f64::from(u8::from(r == i)));
+            sum = sum + &unit.transpose() * expression.clone() * &unit;
+        }
+    }
+    sum
 }

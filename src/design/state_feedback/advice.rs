@@ -1,22 +1,17 @@
 //! Which change of an infeasible request helps: each is tried before it is given.
 
 use super::synthesis::is_feasible;
-use crate::design::{Advice, ControlSpec, Lyapunov};
+use crate::design::{Advice, ControlSpec};
 use crate::plant::SwitchedPlant;
 use crate::plant::scaling::Scaling;
 
 /// Tries the usual ways out, one per kind, cheapest change first.
 pub(super) fn search(plant: &SwitchedPlant, spec: &ControlSpec, scaling: &Scaling) -> Vec<Advice> {
     let feasible = |candidate: &ControlSpec| is_feasible(plant, candidate, scaling);
-    let weaker: &[Lyapunov] = match spec.lyapunov {
-        Lyapunov::Common => &[Lyapunov::Switched, Lyapunov::Dwell],
-        Lyapunov::Switched => &[Lyapunov::Dwell],
-        Lyapunov::Dwell => &[],
-    };
     let mut advice = Vec::new();
     let slower = slowest_step(spec, &feasible);
     advice.extend(slower.map(Advice::Decay));
-    let other = weaker.iter().find_map(|&lyapunov| {
+    let other = spec.lyapunov.weaker().iter().find_map(|&lyapunov| {
         let candidate = ControlSpec {
             lyapunov,
             ..spec.clone()
@@ -33,8 +28,7 @@ pub(super) fn search(plant: &SwitchedPlant, spec: &ControlSpec, scaling: &Scalin
 
 /// The fastest decay on a coarse ladder, slower than asked, that is feasible.
 fn slowest_step(spec: &ControlSpec, feasible: &dyn Fn(&ControlSpec) -> bool) -> Option<f64> {
-    let ladder = [0.5, 0.6, 0.7, 0.8, 0.9, 0.95, 0.98, 0.99, 0.995, 0.999];
-    ladder.into_iter().find(|&decay| {
+    Advice::DECAYS.into_iter().find(|&decay| {
         let slower = ControlSpec {
             decay,
             ..spec.clone()
@@ -52,10 +46,8 @@ fn fewer_outputs(
         return None;
     }
     (0..spec.tracked.len()).rev().find_map(|left_out| {
-        let mut fewer = spec.clone();
-        fewer.tracked.remove(left_out);
-        fewer.output_weight.remove(left_out);
-        fewer.integral_weight.remove(left_out);
-        feasible(&fewer).then_some(fewer.tracked)
+        let mut fewer = spec.tracked.clone();
+        fewer.remove(left_out);
+        feasible(&Advice::Tracked(fewer.clone()).apply(spec)).then_some(fewer)
     })
 }

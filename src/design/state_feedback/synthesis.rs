@@ -1,26 +1,36 @@
 //! The road from the augmented model to certified gains.
 //!
-//! Scale; decide feasibility by the margin problem; minimise `g = gamma^2`; give up a hair of the
-//! optimum for the largest margin, so that the result lies strictly inside; scale back; certify.
+//! Scale; decide feasibility by the margin problem; minimise `g = gamma^2` in coordinates where the
+//! solver is at ease; give up a hair of the optimum for the largest margin, so that the result lies
+//! strictly inside; scale back; certify.
 
 use super::advice;
+use super::frame::{Frame, Part};
+use super::theorem;
 use super::{ModeGains, StateFeedback};
 use crate::design::augmented::{AugmentedMode, augment, scaled};
-use crate::design::certificate::{ControlCertificate, LyapunovMatrix};
-use crate::design::lmi::{Affine, Inequality, Margin, Problem, Variable};
-use crate::design::verdict::{
-    BlockKind, BlockName, ConflictingBlock, DesignError, Infeasibility, SolverFailure,
-};
-use crate::design::{CertificateError, ControlSpec, DwellTime, Lyapunov, Objective, Units};
+use crate::design::certificate::{ControlCertificate, LyapunovMatrix, provable_dwell};
+use crate::design::lmi::Margin;
+use crate::design::verdict::{DesignError, SolverFailure, infeasible};
+use crate::design::{ControlSpec, Lyapunov, Objective, Units};
 use crate::plant::scaling::Scaling;
 use crate::plant::{Dimensions, SwitchedPlant, spectral_radius};
-use nalgebra::{DMatrix, SymmetricEigen};
+use nalgebra::DMatrix;
 
 /// Relative sacrifices of `g = gamma^2` for a margin, tried in turn until the certificate holds.
 const SACRIFICES: [f64; 4] = [2e-5, 1e-4, 1e-3, 1e-2];
 
 /// A margin below this is no margin: the solver's own accuracy.
 const SMALLEST_MARGIN: f64 = 1e-9;
+
+/// A margin above this needs no better coordinates.
+const THICK_MARGIN: f64 = 1e-2;
+
+/// How often better coordinates are sought.
+const REFRAMINGS: usize = 3;
+
+/// Relative duality gap at which an optimum is good to more digits than are reported.
+const SMALL_GAP: f64 = 1e-7;
 
 /// Designs the state feedback that is asked for and proves it.
 ///
@@ -37,24 +47,26 @@ pub fn synthesise(
     let dims = Dimensions::check(plant).map_err(DesignError::Request)?;
     spec.check(dims).map_err(DesignError::Request)?;
     let units = Units::choose(plant, spec, scaling);
-    let models = augment(plant, spec, &units);
-
-    for group in groups(spec.lyapunov, models.len()) {
-        let margin = stability(&models, spec, &group).0.margin()?;
-        if margin.margin < SMALLEST_MARGIN {
-            let advice = advice::search(plant, spec, scaling);
-            return Err(infeasible(margin, advice));
+    let road = Road {
+        plant,
+        spec,
+        models: augment(plant, spec, &units),
+        units,
+    };
+    let mut stable = Vec::new();
+    for group in road.groups() {
+        match road.stabilised(&group)? {
+            Verdict::Stable(parts) => stable.push(parts),
+            Verdict::Conflict(margin) => {
+                let advice = advice::search(plant, spec, scaling);
+                return Err(infeasible(margin.margin, margin.weights, advice));
+            }
         }
     }
-    let attenuates =
-        spec.objective == Objective::Attenuation && models.iter().any(|model| model.e.amax() > 0.0);
-    if attenuates {
-        attenuate(plant, spec, &units, &models)
-    } else {
-        let parts = each_group(spec, &models, |group| stabilise(&models, spec, group))?;
-        let design = assemble(plant, spec, &units, &models, parts, None)?;
-        design.verify(plant)?;
-        Ok(design)
+    let disturbed = road.models.iter().any(|model| model.e.amax() > 0.0);
+    match spec.objective {
+        Objective::Attenuation if disturbed => road.attenuate(&stable),
+        Objective::Attenuation | Objective::Decay => road.certified(stable.concat(), None),
     }
 }
 
@@ -62,335 +74,180 @@ pub fn synthesise(
 pub(super) fn is_feasible(plant: &SwitchedPlant, spec: &ControlSpec, scaling: &Scaling) -> bool {
     let units = Units::choose(plant, spec, scaling);
     let models = augment(plant, spec, &units);
-    groups(spec.lyapunov, models.len()).iter().all(|group| {
-        let margin = stability(&models, spec, group).0.margin();
-        margin.is_ok_and(|found| found.margin > 1e3 * SMALLEST_MARGIN)
+    spec.lyapunov.groups(models.len()).iter().all(|group| {
+        let found = theorem::stabilise(&models, spec, group);
+        found.is_ok_and(|(margin, _)| margin.margin > 1e3 * SMALLEST_MARGIN)
     })
 }
 
-/// Modes that share a problem: each alone under `dwell`, else all together.
-fn groups(lyapunov: Lyapunov, modes: usize) -> Vec<Vec<usize>> {
-    match lyapunov {
-        Lyapunov::Dwell => (0..modes).map(|mode| vec![mode]).collect(),
-        Lyapunov::Common | Lyapunov::Switched => vec![(0..modes).collect()],
+/// Whether a group of modes can be stabilised as asked.
+enum Verdict {
+    Stable(Vec<Part>),
+    Conflict(Margin),
+}
+
+/// What every stage works on.
+struct Road<'a> {
+    plant: &'a SwitchedPlant,
+    spec: &'a ControlSpec,
+    units: Units,
+    models: Vec<AugmentedMode>,
+}
+
+impl Road<'_> {
+    /// Modes that share a problem.
+    fn groups(&self) -> Vec<Vec<usize>> {
+        self.spec.lyapunov.groups(self.models.len())
     }
-}
 
-/// The unknowns of one mode: `S`, `G + G' - S` as an expression, `G` and `R = K~ G`.
-struct ModeUnknowns {
-    /// `S_i`: proves.
-    lyapunov: Variable,
-    /// `G_i`: equals `S_i` unless the guarantee is `switched`.
-    slack: Variable,
-    /// `R_i = K~_i G_i`.
-    feedback: Variable,
-}
-
-impl ModeUnknowns {
-    /// `G + G' - S`, which is `S` itself when `G` is.
-    fn own(&self, lyapunov: Lyapunov) -> Affine {
-        match lyapunov {
-            Lyapunov::Switched => {
-                let slack = self.slack.expression();
-                slack.clone() + slack.transpose() - self.lyapunov.expression()
-            }
-            Lyapunov::Common | Lyapunov::Dwell => self.lyapunov.expression(),
+    /// Stabilising gains of a group (T1): solved, and solved again in the coordinates the solution
+    /// suggests as long as its margin is thin and grows.
+    fn stabilised(&self, group: &[usize]) -> Result<Verdict, SolverFailure> {
+        let (margin, mut parts) = theorem::stabilise(&self.models, self.spec, group)?;
+        if margin.margin < SMALLEST_MARGIN {
+            return Ok(Verdict::Conflict(margin));
         }
-    }
-}
-
-/// Makes the unknowns for the modes of a group.
-fn unknowns(
-    problem: &mut Problem,
-    models: &[AugmentedMode],
-    lyapunov: Lyapunov,
-    group: &[usize],
-) -> Vec<ModeUnknowns> {
-    let (size, inputs) = models[0].b.shape();
-    let mut shared = None;
-    group
-        .iter()
-        .map(|_| {
-            let own = match (lyapunov, shared) {
-                (Lyapunov::Common, Some(first)) => first,
-                _ => problem.symmetric(size),
+        let mut thickness = margin.margin;
+        for _ in 0..REFRAMINGS {
+            let frame = Frame::of_stabilised(&self.models, &parts);
+            let Some(frame) = frame.filter(|_| thickness < THICK_MARGIN) else {
+                break;
             };
-            shared = Some(own);
-            ModeUnknowns {
-                lyapunov: own,
-                slack: match lyapunov {
-                    Lyapunov::Switched => problem.full(size, size),
-                    Lyapunov::Common | Lyapunov::Dwell => own,
-                },
-                feedback: problem.full(inputs, size),
+            match theorem::stabilise(&frame.view(&self.models), self.spec, group) {
+                Ok((margin, better)) if margin.margin > thickness => {
+                    thickness = margin.margin;
+                    parts = frame.restore(better);
+                }
+                _ => break,
             }
-        })
-        .collect()
-}
-
-/// Pairs of positions within a group whose inequalities must hold.
-fn pairs(lyapunov: Lyapunov, group: &[usize]) -> Vec<(usize, usize)> {
-    lyapunov.pairs(group.len())
-}
-
-/// `A G + B R`.
-fn next_state(model: &AugmentedMode, unknowns: &ModeUnknowns) -> Affine {
-    &model.a * &unknowns.slack + &model.b * &unknowns.feedback
-}
-
-/// Demands the decay block of (T2) for every pair of a group.
-fn require_decay(
-    problem: &mut Problem,
-    models: &[AugmentedMode],
-    spec: &ControlSpec,
-    group: &[usize],
-    unknowns: &[ModeUnknowns],
-) {
-    for (i, j) in pairs(spec.lyapunov, group) {
-        let name = BlockName::new(BlockKind::Decay, group[i], group[j]);
-        let own = spec.decay.powi(2) * unknowns[i].own(spec.lyapunov);
-        let next = next_state(&models[group[i]], &unknowns[i]);
-        problem.require(Inequality::new(
-            name,
-            vec![
-                vec![Some(own)],
-                vec![Some(next), Some(unknowns[j].lyapunov.expression())],
-            ],
-        ));
+        }
+        Ok(Verdict::Stable(parts))
     }
-}
 
-/// Demands the attenuation block of (T2) for every pair of a group, `level` being `g I`.
-fn require_attenuation(
-    problem: &mut Problem,
-    models: &[AugmentedMode],
-    lyapunov: Lyapunov,
-    group: &[usize],
-    unknowns: &[ModeUnknowns],
-    level: &Affine,
-) {
-    for (i, j) in pairs(lyapunov, group) {
-        let model = &models[group[i]];
-        let name = BlockName::new(BlockKind::Attenuation, group[i], group[j]);
-        let performance = &model.h * &unknowns[i].slack + &model.d * &unknowns[i].feedback;
-        let signals = model.h.nrows();
-        problem.require(Inequality::new(
-            name,
-            vec![
-                vec![Some(unknowns[i].own(lyapunov))],
-                vec![None, Some(level.clone())],
-                vec![
-                    Some(next_state(model, &unknowns[i])),
-                    Some(model.e.clone().into()),
-                    Some(unknowns[j].lyapunov.expression()),
-                ],
-                vec![
-                    Some(performance),
-                    None,
-                    None,
-                    Some(DMatrix::identity(signals, signals).into()),
-                ],
-            ],
-        ));
+    /// The least `g` of a group, and coordinates in which (T2) is at ease near it.
+    fn least_level(&self, group: &[usize], start: &[Part]) -> Result<(f64, Frame), SolverFailure> {
+        let mut frame = Frame::of_stabilised(&self.models, start)
+            .unwrap_or_else(|| Frame::identity(self.models[0].a.nrows()));
+        let mut best: Option<(f64, f64)> = None;
+        for _ in 0..REFRAMINGS {
+            let view = frame.view(&self.models);
+            let Ok((candidate, parts)) = theorem::least_level(&view, self.spec, group) else {
+                break;
+            };
+            let level = frame.restore_level(candidate.objective);
+            let gap = (candidate.objective - candidate.bound).abs() / candidate.objective.abs();
+            if best.is_none_or(|(_, smallest)| gap < smallest) {
+                best = Some((level, gap));
+            }
+            let Some(better) = Frame::of_attenuated(&frame.restore(parts), level) else {
+                break;
+            };
+            frame = better;
+            if gap < SMALL_GAP {
+                break;
+            }
+        }
+        best.map(|(level, _)| (level, frame))
+            .ok_or(SolverFailure::NumericalTrouble)
     }
-}
 
-/// Theorem T1 of a group, normalised: the traces of the Lyapunov matrices add up to their sizes.
-fn stability(
-    models: &[AugmentedMode],
-    spec: &ControlSpec,
-    group: &[usize],
-) -> (Problem, Vec<ModeUnknowns>) {
-    let mut problem = Problem::new();
-    let unknowns = unknowns(&mut problem, models, spec.lyapunov, group);
-    require_decay(&mut problem, models, spec, group, &unknowns);
-    let distinct = spec.lyapunov.matrices(group.len());
-    let matrices: Vec<Affine> = unknowns[..distinct]
-        .iter()
-        .map(|unknown| unknown.lyapunov.expression())
-        .collect();
-    let total = distinct * models[0].a.nrows();
-    problem.require_trace(&matrices, total as f64);
-    (problem, unknowns)
-}
-
-/// Gains and Lyapunov matrix of one mode, in the design's units.
-struct Part {
-    mode: usize,
-    gain: DMatrix<f64>,
-    lyapunov: DMatrix<f64>,
-}
-
-/// Solves every group and puts the parts in the order of the modes.
-fn each_group(
-    spec: &ControlSpec,
-    models: &[AugmentedMode],
-    mut solve: impl FnMut(&[usize]) -> Result<Vec<Part>, SolverFailure>,
-) -> Result<Vec<Part>, DesignError> {
-    let mut parts = Vec::new();
-    for group in groups(spec.lyapunov, models.len()) {
-        parts.extend(solve(&group)?);
+    /// Theorem T2: the least `gamma`, the gains that reach it but for a hair, and their proof.
+    fn attenuate(&self, stable: &[Vec<Part>]) -> Result<StateFeedback, DesignError> {
+        let groups = self.groups();
+        let mut least = Vec::new();
+        for (group, start) in groups.iter().zip(stable) {
+            least.push(self.least_level(group, start)?);
+        }
+        let mut outcome = Err(DesignError::Solver(SolverFailure::NumericalTrouble));
+        for sacrifice in SACRIFICES {
+            let mut levels = Levels::new(self);
+            let mut parts = Vec::new();
+            for (group, (level, frame)) in groups.iter().zip(&least) {
+                let relaxed = levels.set(group, *level, sacrifice);
+                let view = frame.view(&self.models);
+                match theorem::centred(&view, self.spec, group, frame.view_level(relaxed)) {
+                    Ok(found) => parts.extend(frame.restore(found)),
+                    Err(failure) => outcome = Err(failure.into()),
+                }
+            }
+            if parts.len() == self.models.len() {
+                outcome = self.certified(parts, Some(levels));
+            }
+            if outcome.is_ok() {
+                break;
+            }
+        }
+        outcome
     }
-    parts.sort_by_key(|part| part.mode);
-    Ok(parts)
-}
 
-/// Reads gains and Lyapunov matrices of a group: `K~ = R G^-1`.
-fn read(
-    group: &[usize],
-    unknowns: &[ModeUnknowns],
-    scalars: &[f64],
-) -> Result<Vec<Part>, SolverFailure> {
-    let modes = group.iter().zip(unknowns);
-    modes
-        .map(|(&mode, unknowns)| {
-            let slack = unknowns.slack.value(scalars);
-            let feedback = unknowns.feedback.value(scalars);
-            let gain = slack
-                .transpose()
-                .lu()
-                .solve(&feedback.transpose())
-                .ok_or(SolverFailure::NumericalTrouble)?
-                .transpose();
-            Ok(Part {
-                mode,
-                gain,
-                lyapunov: unknowns.lyapunov.value(scalars),
-            })
-        })
-        .collect()
-}
-
-/// The stabilising gains of largest margin.
-fn stabilise(
-    models: &[AugmentedMode],
-    spec: &ControlSpec,
-    group: &[usize],
-) -> Result<Vec<Part>, SolverFailure> {
-    let (problem, unknowns) = stability(models, spec, group);
-    read(group, &unknowns, &problem.margin()?.scalars)
-}
-
-/// The least `g` of a group, as the solver sees it.
-fn least_level(
-    models: &[AugmentedMode],
-    spec: &ControlSpec,
-    group: &[usize],
-) -> Result<f64, SolverFailure> {
-    let mut problem = Problem::new();
-    let unknowns = unknowns(&mut problem, models, spec.lyapunov, group);
-    let level = problem.scalar();
-    let identity = level.times_identity(models[0].e.ncols());
-    require_attenuation(
-        &mut problem,
-        models,
-        spec.lyapunov,
-        group,
-        &unknowns,
-        &identity,
-    );
-    require_decay(&mut problem, models, spec, group, &unknowns);
-    Ok(problem.minimise(&level)?.objective)
-}
-
-/// The gains of largest margin at a given `g`.
-fn centred(
-    models: &[AugmentedMode],
-    spec: &ControlSpec,
-    group: &[usize],
-    level: f64,
-) -> Result<Vec<Part>, SolverFailure> {
-    let mut problem = Problem::new();
-    let unknowns = unknowns(&mut problem, models, spec.lyapunov, group);
-    let disturbances = models[0].e.ncols();
-    let identity = DMatrix::from_diagonal_element(disturbances, disturbances, level).into();
-    require_attenuation(
-        &mut problem,
-        models,
-        spec.lyapunov,
-        group,
-        &unknowns,
-        &identity,
-    );
-    require_decay(&mut problem, models, spec, group, &unknowns);
-    read(group, &unknowns, &problem.margin()?.scalars)
-}
-
-/// Theorem T2: the least `gamma`, the gains that reach it, and their proof.
-fn attenuate(
-    plant: &SwitchedPlant,
-    spec: &ControlSpec,
-    units: &Units,
-    models: &[AugmentedMode],
-) -> Result<StateFeedback, DesignError> {
-    let mut least = vec![0.0; models.len()];
-    for group in groups(spec.lyapunov, models.len()) {
-        let level = least_level(models, spec, &group)?.max(f64::MIN_POSITIVE);
-        group.iter().for_each(|&mode| least[mode] = level);
-    }
-    let physical = units.performance / units.disturbance;
-    let optimum: Vec<f64> = least.iter().map(|level| level.sqrt() * physical).collect();
-
-    let mut outcome = Err(DesignError::Solver(SolverFailure::NumericalTrouble));
-    for sacrifice in SACRIFICES {
-        let gamma: Vec<f64> = least
+    /// Puts the parts together in physical units, and proves the whole.
+    fn certified(
+        &self,
+        parts: Vec<Part>,
+        levels: Option<Levels>,
+    ) -> Result<StateFeedback, DesignError> {
+        let (spec, plant) = (self.spec, self.plant);
+        let distinct = spec.lyapunov.matrices(parts.len());
+        let matrices: Vec<DMatrix<f64>> = parts[..distinct]
             .iter()
-            .map(|level| (level * (1.0 + sacrifice)).sqrt() * physical)
+            .map(|part| part.lyapunov.clone())
             .collect();
-        let level = |mode: usize| (gamma[mode] / physical).powi(2);
-        outcome = each_group(spec, models, |group| {
-            centred(models, spec, group, level(group[0]))
-        })
-        .and_then(|parts| {
-            let levels = Some((gamma.clone(), optimum.clone()));
-            let design = assemble(plant, spec, units, models, parts, levels)?;
-            design.verify(plant)?;
-            Ok(design)
-        });
-        if outcome.is_ok() {
-            break;
+        let dwell = match spec.lyapunov {
+            Lyapunov::Dwell => Some(provable_dwell(&matrices, spec.decay, plant.sample_time)?),
+            Lyapunov::Common | Lyapunov::Switched => None,
+        };
+        let closed = self.models.iter().zip(&parts);
+        let (gamma, optimum) = levels.map(|l| (l.gamma, l.optimum)).unzip();
+        let design = StateFeedback {
+            spec: spec.clone(),
+            spectral_radius: closed
+                .map(|(model, part)| spectral_radius(&(&model.a + &model.b * &part.gain)))
+                .collect(),
+            modes: parts
+                .iter()
+                .map(|part| physical_gains(&part.gain, &self.units, spec.latency))
+                .collect(),
+            gamma,
+            optimum,
+            dwell,
+            certificate: ControlCertificate {
+                units: self.units.clone(),
+                lyapunov: matrices.into_iter().map(LyapunovMatrix).collect(),
+            },
+        };
+        design.verify(plant)?;
+        Ok(design)
+    }
+}
+
+/// `gamma` per mode, in the user's units.
+struct Levels {
+    gamma: Vec<f64>,
+    optimum: Vec<f64>,
+    /// What one unit of `gamma` in the design's units is to the user.
+    physical: f64,
+}
+
+impl Levels {
+    fn new(road: &Road) -> Self {
+        let modes = road.models.len();
+        Self {
+            gamma: vec![0.0; modes],
+            optimum: vec![0.0; modes],
+            physical: road.units.performance / road.units.disturbance,
         }
     }
-    outcome
-}
 
-/// Puts the parts together, in physical units.
-fn assemble(
-    plant: &SwitchedPlant,
-    spec: &ControlSpec,
-    units: &Units,
-    models: &[AugmentedMode],
-    parts: Vec<Part>,
-    levels: Option<(Vec<f64>, Vec<f64>)>,
-) -> Result<StateFeedback, DesignError> {
-    let distinct = spec.lyapunov.matrices(parts.len());
-    let matrices: Vec<DMatrix<f64>> = parts[..distinct]
-        .iter()
-        .map(|part| part.lyapunov.clone())
-        .collect();
-    let dwell = match spec.lyapunov {
-        Lyapunov::Dwell => Some(dwell_time(&matrices, spec.decay, plant.sample_time)?),
-        Lyapunov::Common | Lyapunov::Switched => None,
-    };
-    let closed = models.iter().zip(&parts);
-    let (gamma, optimum) = levels.unzip();
-    Ok(StateFeedback {
-        spec: spec.clone(),
-        spectral_radius: closed
-            .map(|(model, part)| spectral_radius(&(&model.a + &model.b * &part.gain)))
-            .collect(),
-        modes: parts
-            .iter()
-            .map(|part| physical_gains(&part.gain, units, spec.latency))
-            .collect(),
-        gamma,
-        optimum,
-        dwell,
-        certificate: ControlCertificate {
-            units: units.clone(),
-            lyapunov: matrices.into_iter().map(LyapunovMatrix).collect(),
-        },
-    })
+    /// Notes the least level `g` of a group, gives up `sacrifice` of it, and returns the `g` that is
+    /// left to prove.
+    fn set(&mut self, group: &[usize], level: f64, sacrifice: f64) -> f64 {
+        let relaxed = level.max(f64::MIN_POSITIVE) * (1.0 + sacrifice);
+        for &mode in group {
+            self.optimum[mode] = level.max(0.0).sqrt() * self.physical;
+            self.gamma[mode] = relaxed.sqrt() * self.physical;
+        }
+        relaxed
+    }
 }
 
 /// Splits `K~ = [K, K_u, G]` and undoes the scaling; exact, since the units are powers of two.
@@ -412,49 +269,4 @@ fn physical_gains(gain: &DMatrix<f64>, units: &Units, latency: usize) -> ModeGai
         previous_input: part(n, &units.inputs[..previous]),
         integral: part(n + previous, &units.integrators[..r]),
     }
-}
-
-/// The dwell time that the factor between the Lyapunov matrices asks for, with `mu` a hair above
-/// its computed value so that it can be proved.
-pub(crate) fn dwell_time(
-    matrices: &[DMatrix<f64>],
-    decay: f64,
-    sample_time: f64,
-) -> Result<DwellTime, DesignError> {
-    let mut mu = 1.0_f64;
-    for (i, own) in matrices.iter().enumerate() {
-        for (j, next) in matrices.iter().enumerate().filter(|(j, _)| *j != i) {
-            let factor = next.clone().cholesky().ok_or_else(|| {
-                CertificateError::Unproved(BlockName::new(BlockKind::Lyapunov, j, j))
-            })?;
-            let half = factor
-                .l()
-                .solve_lower_triangular(own)
-                .ok_or(SolverFailure::NumericalTrouble)?;
-            let ratio = factor
-                .l()
-                .solve_lower_triangular(&half.transpose())
-                .ok_or(SolverFailure::NumericalTrouble)?;
-            let symmetric = 0.5 * (&ratio + ratio.transpose());
-            mu = mu.max(SymmetricEigen::new(symmetric).eigenvalues.max());
-            debug_assert!(i != j);
-        }
-    }
-    Ok(DwellTime::new(mu * (1.0 + 1e-9), decay, sample_time))
-}
-
-/// The verdict on a conflict: blocks by weight, the heaviest first.
-pub(crate) fn infeasible(margin: Margin, advice: Vec<crate::design::Advice>) -> DesignError {
-    let mut blocks: Vec<ConflictingBlock> = margin
-        .weights
-        .into_iter()
-        .filter(|(_, weight)| *weight > 1e-3)
-        .map(|(name, weight)| ConflictingBlock { name, weight })
-        .collect();
-    blocks.sort_by(|x, y| y.weight.total_cmp(&x.weight));
-    DesignError::Infeasible(Infeasibility {
-        margin: margin.margin.min(0.0),
-        blocks,
-        advice,
-    })
 }

@@ -87,6 +87,8 @@ fn lags(outputs: usize, disturbances: usize, steps: u64) -> Design {
             feedback: StateFeedback {
                 tracked: (0..outputs).collect(),
                 latency: 0,
+                resonators: vec![],
+                bumpless: false,
                 modes: vec![gains; 2],
             },
             observer: Observer {
@@ -100,7 +102,9 @@ fn lags(outputs: usize, disturbances: usize, steps: u64) -> Design {
                 response_length: 0,
                 window: 0,
                 predictors: vec![],
+                adapt: false,
                 harmonics: None,
+                harmonic_transfers: vec![],
                 thresholds: vec![0.1; outputs],
                 debounce: 1,
                 leverage_limit: 100.0,

@@ -234,18 +234,26 @@ impl<'a> Scene<'a> {
 
     /// A signal of every variant, each in the variant's own look; the one this is about on top.
     fn variants(&self, signal: impl Fn(&Record) -> f64) -> Vec<Series> {
-        [Variant::NoFtc, Variant::ToldTheFault, Variant::Ftc]
-            .into_iter()
-            .filter_map(|variant| find(self.trajectories, variant))
-            .map(|run| {
-                let series = Series::new(variant_name(run.variant), self.points(run, &signal));
-                match run.variant {
-                    Variant::Ftc => series.ink(Ink::Blue),
-                    Variant::NoFtc => series.ink(Ink::Vermilion).dash(Dash::Dashed).secondary(),
-                    Variant::ToldTheFault => series.ink(Ink::Green).weight(Weight::Broad),
-                }
-            })
-            .collect()
+        [
+            Variant::NoFtc,
+            Variant::Additive,
+            Variant::Predictive,
+            Variant::ToldTheFault,
+            Variant::Ftc,
+        ]
+        .into_iter()
+        .filter_map(|variant| find(self.trajectories, variant))
+        .map(|run| {
+            let series = Series::new(variant_name(run.variant), self.points(run, &signal));
+            match run.variant {
+                Variant::Ftc => series.ink(Ink::Blue),
+                Variant::NoFtc => series.ink(Ink::Vermilion).dash(Dash::Dashed).secondary(),
+                Variant::ToldTheFault => series.ink(Ink::Green).weight(Weight::Broad),
+                Variant::Additive => series.ink(Ink::Purple).dash(Dash::Dotted).secondary(),
+                Variant::Predictive => series.ink(Ink::Purple).dash(Dash::Dashed),
+            }
+        })
+        .collect()
     }
 
     fn points(&self, run: &Trajectory, signal: impl Fn(&Record) -> f64) -> Vec<Point> {

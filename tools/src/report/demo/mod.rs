@@ -61,6 +61,8 @@ fn variant_name(variant: Variant) -> &'static str {
         Variant::Ftc => "with FTC",
         Variant::NoFtc => "without FTC",
         Variant::ToldTheFault => "told the fault",
+        Variant::Additive => "additive FTC (printed)",
+        Variant::Predictive => "predictive control",
     }
 }
 

@@ -1,0 +1,45 @@
+# The roads a person and a machine take. Everything needed beyond Rust, a C compiler, Python 3.11
+# or later and make is installed into .venv by the rules below.
+
+PYTHON ?= python3
+VENV := .venv
+IN_VENV := $(VENV)/bin/
+
+.PHONY: build test test-rust test-python demo bench lint clean
+
+build:
+	cargo build --release --workspace
+
+test: test-rust test-python
+
+# In release mode: the design's optimisation problems are solved many times over, and the Python
+# tests need the release binaries anyway.
+test-rust:
+	cargo test --release --workspace
+
+test-python: build $(VENV)/ready
+	$(IN_VENV)python -m pytest
+
+demo: build $(VENV)/ready
+	PYTHONPATH=tests/support $(IN_VENV)python tests/fmpy/demo.py examples/paper.toml out/demo
+
+bench: build
+	cargo bench --workspace
+
+lint: $(VENV)/ready
+	cargo fmt --all --check
+	cargo clippy --workspace --all-targets -- -D warnings
+	RUSTDOCFLAGS="-D warnings" cargo doc --workspace --no-deps --document-private-items
+	$(IN_VENV)ruff check
+	$(IN_VENV)ruff format --check
+
+clean:
+	cargo clean
+	rm -rf out $(VENV)
+
+# Made anew whenever the requirements change, so that nothing is left of the old ones.
+$(VENV)/ready: tests/requirements.txt
+	rm -rf $(VENV)
+	$(PYTHON) -m venv $(VENV)
+	$(IN_VENV)pip install --quiet --disable-pip-version-check --requirement tests/requirements.txt
+	touch $@

@@ -1,0 +1,111 @@
+//! Messages to the importer.
+
+use crate::types::{LoggerCallback, Pointer, Status};
+use model_description::LOG_CATEGORIES;
+use std::ffi::{CStr, CString};
+
+/// Position of `logAll`, which stands for every category.
+const ALL: usize = LOG_CATEGORIES.len() - 1;
+
+/// The importer's logger, and which categories it wants to hear.
+///
+/// Silent when off. The text handed over is finished: it holds no `%`, which the importer's
+/// `printf` would interpret, and `#`, the standard's mark for value references, is doubled.
+#[derive(Debug)]
+pub struct Logger {
+    callback: Option<LoggerCallback>,
+    environment: Pointer,
+    instance_name: CString,
+    enabled: [bool; LOG_CATEGORIES.len()],
+}
+
+impl Logger {
+    /// A logger for an instance of this name; `callback` may be absent.
+    pub fn new(
+        callback: Option<LoggerCallback>,
+        environment: Pointer,
+        instance_name: &CStr,
+        on: bool,
+    ) -> Self {
+        Self {
+            callback,
+            environment,
+            instance_name: instance_name.to_owned(),
+            enabled: [on; LOG_CATEGORIES.len()],
+        }
+    }
+
+    /// Switches the named categories, or all if none is named.
+    ///
+    /// An unknown category is refused, and then nothing is switched.
+    pub fn switch(&mut self, on: bool, categories: &[&CStr]) -> Result<(), String> {
+        let known = |name: &&CStr| {
+            LOG_CATEGORIES
+                .iter()
+                .position(|(category, _)| name.to_bytes() == category.as_bytes())
+                .ok_or_else(|| format!("there is no log category {}", name.to_string_lossy()))
+        };
+        let chosen: Vec<usize> = categories.iter().map(known).collect::<Result<_, _>>()?;
+        let all = chosen.is_empty() || chosen.contains(&ALL);
+        for (at, enabled) in self.enabled.iter_mut().enumerate() {
+            if all || chosen.contains(&at) {
+                *enabled = on;
+            }
+        }
+        Ok(())
+    }
+
+    /// Whether a message of this status would be heard.
+    pub fn hears(&self, status: Status) -> bool {
+        self.callback.is_some() && self.enabled.get(category(status)).is_some_and(|on| *on)
+    }
+
+    /// Hands over a message if its category is on.
+    pub fn log(&self, status: Status, message: &str) {
+        if self.hears(status) {
+            self.log_always(status, message);
+        }
+    }
+
+    /// Hands over a message whatever is switched: the standard wants the reason of a failed
+    /// fmi2Instantiate to be told, and no category can have been switched on before it.
+    pub fn log_always(&self, status: Status, message: &str) {
+        let Some(callback) = self.callback else {
+            return;
+        };
+        let (name, _) = LOG_CATEGORIES[category(status)];
+        let (category, text) = (finished(name), finished(message));
+        // SAFETY: the importer promises a logger with the standard's signature that lives as
+        // long as the instance; all strings live until it returns.
+        unsafe {
+            callback(
+                self.environment,
+                self.instance_name.as_ptr(),
+                status,
+                category.as_ptr(),
+                text.as_ptr(),
+            );
+        }
+    }
+}
+
+/// Position of the category to which messages of a status belong.
+fn category(status: Status) -> usize {
+    match status {
+        Status::Ok | Status::Pending => 0,
+        Status::Warning => 1,
+        Status::Discard => 2,
+        Status::Error => 3,
+        Status::Fatal => 4,
+    }
+}
+
+/// A C string that `printf` prints as it is.
+fn finished(message: &str) -> CString {
+    let text: String = message
+        .chars()
+        .filter(|c| *c != '\0')
+        .map(|c| if c == '%' { '\u{ff05}' } else { c })
+        .collect();
+    CString::new(text.replace('#', "##")).unwrap_or_default()
+}

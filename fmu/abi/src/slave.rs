@@ -1,0 +1,167 @@
+//! The one seam between the C interface and what an FMU computes.
+//!
+//! On this side: when something is computed (the life cycle, the clock), what may be set (the
+//! table), how it is saved, refused and reported. On the other side: what is computed at a
+//! tick. A slave sees neither C nor time in seconds, and cannot tell one importer from another.
+//!
+//! A slave is split in two. `Self` is the model, loaded once and never changed; `Self::State`
+//! is plain data and holds *everything* that changes at run time. That split is what makes
+//! saving, restoring, resetting and serialising a matter of cloning a value.
+
+use crate::Values;
+use model_description::{Span, VariableTable};
+use serde::{Serialize, de::DeserializeOwned};
+use std::path::Path;
+
+/// Why a slave did not compute: one sentence that names the variable and its value.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Refusal(pub String);
+
+impl From<String> for Refusal {
+    fn from(message: String) -> Self {
+        Self(message)
+    }
+}
+
+impl From<&str> for Refusal {
+    fn from(message: &str) -> Self {
+        Self(message.into())
+    }
+}
+
+/// A sampled system behind the FMI 2.0 co-simulation interface.
+///
+/// # On line
+///
+/// Between [`Slave::initialize`] and the end of the run nothing may allocate: scratch memory
+/// belongs into `State`, sized by [`Slave::initial_state`].
+pub trait Slave: Sized + 'static {
+    /// Everything that changes at run time, including scratch that a later tick reads.
+    type State: Clone + Serialize + DeserializeOwned + 'static;
+
+    /// Loads the model from the FMU's unpacked `resources` folder.
+    ///
+    /// `guid` is what the importer read in the XML; compare it with
+    /// [`crate::resource::read_verified`]. The error is one sentence for the importer's log.
+    fn load(resources: &Path, guid: &str) -> Result<Self, String>;
+
+    /// The variables, whose positions are the value references.
+    fn variables(&self) -> &VariableTable;
+
+    /// `Te` in seconds, positive.
+    fn sample_time(&self) -> f64;
+
+    /// The state of a fresh instance, the same at every call.
+    fn initial_state(&self) -> Self::State;
+
+    /// Computes the outputs at the start time from parameters and initial inputs.
+    ///
+    /// Called with a fresh state, and again with another fresh one whenever values were set in
+    /// initialization mode, so only the last call before the first tick counts.
+    fn initialize(&self, state: &mut Self::State, values: &mut Values) -> Result<(), Refusal>;
+
+    /// Tick `k` begins: time goes beyond `k Te`. Inputs are sampled here.
+    ///
+    /// A controller computes and publishes here; a plant latches its inputs and computes, and
+    /// publishes in [`Slave::end_tick`]. An error leaves the instance in the error state, from
+    /// which reset, a restored state and free lead out; what can be told from the inputs alone
+    /// belongs into [`Slave::check_inputs`].
+    fn begin_tick(
+        &self,
+        state: &mut Self::State,
+        values: &mut Values,
+        k: u64,
+    ) -> Result<(), Refusal>;
+
+    /// Tick `k` ends: time has reached `(k + 1) Te`.
+    fn end_tick(
+        &self,
+        _state: &mut Self::State,
+        _values: &mut Values,
+        _k: u64,
+    ) -> Result<(), Refusal> {
+        Ok(())
+    }
+
+    /// Whether the inputs can be worked with, asked before a step in which a tick begins, and
+    /// before [`Slave::initialize`].
+    ///
+    /// A refusal is fmi2Error and nothing else happens: outputs keep their last values, no tick
+    /// is run, and the importer may repeat the step or go on.
+    fn check_inputs(&self, _values: &Values) -> Result<(), Refusal> {
+        Ok(())
+    }
+
+    /// Whether [`Slave::directional_derivative`] is available.
+    const PROVIDES_DIRECTIONAL_DERIVATIVE: bool = false;
+
+    /// The response of the outputs to a change of the inputs, at the present state.
+    ///
+    /// `seed` and `response` have an element for each variable: `seed` holds the changes of the
+    /// known variables and zero elsewhere; `response`, zero on entry, receives the changes of
+    /// the outputs that the next tick would publish.
+    fn directional_derivative(
+        &self,
+        _state: &Self::State,
+        _values: &Values,
+        _seed: &Values,
+        _response: &mut Values,
+    ) -> Result<(), Refusal> {
+        Err("this model provides no directional derivatives".into())
+    }
+
+    /// Whether a deserialised state has the sizes of this model.
+    ///
+    /// Its bytes carry a checksum and this model's fingerprint, so a mismatch takes malice;
+    /// a slave that indexes by stored sizes checks them here.
+    fn fits(&self, _state: &Self::State) -> bool {
+        true
+    }
+}
+
+/// The active mode, counted from 0, from its Integer variable and its Real twin.
+///
+/// The Real wins when it is connected, that is, not 0. Errors name the variable and its value.
+pub fn selected_mode(
+    table: &VariableTable,
+    values: &Values,
+    integer: Span,
+    real: Span,
+    modes: usize,
+) -> Result<usize, Refusal> {
+    let twin = values.scalar(real);
+    let (span, value) = if twin == 0.0 {
+        (integer, values.scalar(integer))
+    } else {
+        (real, twin)
+    };
+    if value.fract() == 0.0 && value >= 1.0 && value <= modes as f64 {
+        Ok(value as usize - 1)
+    } else {
+        let name = name(table, span.first);
+        Err(Refusal(format!(
+            "{name} is {value}, but the modes are the whole numbers from 1 to {modes}"
+        )))
+    }
+}
+
+/// Refuses a vector with an element that is NaN or infinite, and names the element.
+pub fn require_finite(table: &VariableTable, values: &Values, span: Span) -> Result<(), Refusal> {
+    let elements = values.get(span);
+    match (span.first..)
+        .zip(elements)
+        .find(|(_, value)| !value.is_finite())
+    {
+        None => Ok(()),
+        Some((reference, value)) => Err(Refusal(format!(
+            "{} is {value}: give a finite number",
+            name(table, reference)
+        ))),
+    }
+}
+
+fn name(table: &VariableTable, reference: u32) -> &str {
+    table
+        .get(reference)
+        .map_or("an unknown variable", |variable| &variable.name)
+}

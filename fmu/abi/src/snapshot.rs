@@ -1,0 +1,87 @@
+//! Everything that changes at run time, as one value.
+
+use crate::clock::Clock;
+use crate::life_cycle::State;
+use crate::{Slave, Values};
+use serde::{Deserialize, Serialize, de::DeserializeOwned};
+
+/// Marks serialised states, with the version of their layout.
+const MARK: [u8; 8] = *b"FTCFMU\0\x01";
+
+/// Length of the checksum at the end.
+const CHECKSUM: usize = size_of::<u32>();
+
+/// Life cycle, time, values and the slave's state: what fmi2GetFMUstate saves.
+///
+/// The logger's switches are not part of it, and neither is the model.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+pub struct Snapshot<T> {
+    /// Where in the life cycle.
+    pub phase: State,
+    /// Whether fmi2SetupExperiment was called.
+    pub set_up: bool,
+    /// Whether values were set in initialization mode since outputs were computed.
+    pub stale: bool,
+    /// Time.
+    pub clock: Clock,
+    /// Values of all variables.
+    pub values: Values,
+    /// The slave's own state.
+    pub state: T,
+}
+
+impl<T> Snapshot<T> {
+    /// The state after fmi2Instantiate and after fmi2Reset.
+    pub fn fresh<S: Slave<State = T>>(slave: &S) -> Self {
+        Self {
+            phase: State::Instantiated,
+            set_up: false,
+            stale: true,
+            clock: Clock::new(slave.sample_time()),
+            values: Values::start(slave.variables()),
+            state: slave.initial_state(),
+        }
+    }
+
+    /// Bytes without pointers: a mark with a version, the FMU's `guid`, the state, a checksum.
+    pub fn to_bytes(&self, guid: &str) -> Result<Vec<u8>, String>
+    where
+        T: Serialize,
+    {
+        let mut bytes = postcard::to_extend(&(guid, self), MARK.to_vec())
+            .map_err(|error| format!("the state cannot be serialised: {error}"))?;
+        let checksum = crc32fast::hash(&bytes);
+        bytes.extend(checksum.to_le_bytes());
+        Ok(bytes)
+    }
+
+    /// Reads what [`Snapshot::to_bytes`] wrote; refuses damaged and foreign bytes.
+    pub fn from_bytes<S: Slave<State = T>>(
+        bytes: &[u8],
+        guid: &str,
+        slave: &S,
+    ) -> Result<Self, String>
+    where
+        T: DeserializeOwned,
+    {
+        let end = bytes.len().saturating_sub(CHECKSUM);
+        let (body, checksum) = bytes.split_at(end);
+        let Some(content) = body.strip_prefix(&MARK) else {
+            return Err("the bytes are no state of this FMU, or of another version".into());
+        };
+        if checksum != crc32fast::hash(body).to_le_bytes() {
+            return Err("the bytes are damaged: their checksum does not match".into());
+        }
+        let ((of, snapshot), rest): ((String, Self), _) = postcard::take_from_bytes(content)
+            .map_err(|error| format!("the bytes cannot be read: {error}"))?;
+        if of != guid {
+            return Err(format!("the bytes belong to the FMU with guid {of}"));
+        }
+        let fits = snapshot.values.len() == slave.variables().len() && slave.fits(&snapshot.state);
+        if fits && rest.is_empty() {
+            Ok(snapshot)
+        } else {
+            Err("the bytes hold a state of other sizes".into())
+        }
+    }
+}

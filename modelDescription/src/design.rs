@@ -1,0 +1,41 @@
+//! What the tables need of a design.
+
+use crate::{Interface, SignalInfo};
+use ftc::design::{Design, Signal};
+
+impl From<&Design> for Interface {
+    fn from(design: &Design) -> Self {
+        let plant = &design.controller.plant;
+        let sample_time = plant.sample_time;
+        let first = design.scenario.mode(0, sample_time);
+        let point = plant.modes.get(first).map(|mode| &mode.operating_point);
+        let describe = |signals: &[Signal], start: Option<&Vec<f64>>| {
+            signals
+                .iter()
+                .enumerate()
+                .map(|(at, signal)| SignalInfo {
+                    name: signal.name.clone(),
+                    unit: signal.unit.clone().unwrap_or_default(),
+                    nominal: Some(signal.nominal),
+                    min: signal.min,
+                    max: signal.max,
+                    start: start
+                        .and_then(|values| values.get(at))
+                        .copied()
+                        .unwrap_or(0.0),
+                })
+                .collect()
+        };
+        Self {
+            sample_time,
+            stop_time: design.scenario.steps as f64 * sample_time,
+            inputs: describe(&design.signals.inputs, point.map(|p| &p.u)),
+            outputs: describe(&design.signals.outputs, point.map(|p| &p.y)),
+            states: describe(&design.signals.states, point.map(|p| &p.x)),
+            tracked: design.controller.feedback.tracked.clone(),
+            disturbances: plant.dimensions().disturbances,
+            modes: plant.modes.len(),
+            thresholds: design.controller.estimator.thresholds.clone(),
+        }
+    }
+}

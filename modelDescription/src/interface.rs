@@ -1,0 +1,401 @@
+//! The two tables of the project: the controller's and the plant's variables.
+//!
+//! Names are a contract (`y[1]`, `y_ref[1]`, `u[1]` ...), whatever the user calls a signal: the
+//! user's name goes into the description, the unit and the range into the attributes. A range
+//! is declared where the value cannot leave it or must not (measurements that come in,
+//! commands, references); estimates and faulty measurements may leave any range, so they have
+//! none.
+
+use crate::units::display_unit;
+use crate::{Causality, Kind, Role, Span, Variability, Variable, VariableTable};
+
+/// What the user says about a signal.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct SignalInfo {
+    /// The user's name; empty for the default (`u[1]`, `y[1]`, `x[1]`).
+    pub name: String,
+    /// Unit; empty for a pure number.
+    pub unit: String,
+    /// Typical magnitude.
+    pub nominal: Option<f64>,
+    /// Least value.
+    pub min: Option<f64>,
+    /// Greatest value.
+    pub max: Option<f64>,
+    /// Value at the start, moved into the range if it lies outside.
+    pub start: f64,
+}
+
+/// The sizes and signal names of a design, all that the tables need of it.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Interface {
+    /// `Te` in seconds.
+    pub sample_time: f64,
+    /// Length of the default experiment in seconds.
+    pub stop_time: f64,
+    /// Inputs of the plant (m).
+    pub inputs: Vec<SignalInfo>,
+    /// Outputs of the plant (p).
+    pub outputs: Vec<SignalInfo>,
+    /// States of the plant (n).
+    pub states: Vec<SignalInfo>,
+    /// Tracked outputs, positions in `outputs` counted from 0 (r).
+    pub tracked: Vec<usize>,
+    /// Number of disturbances (s).
+    pub disturbances: usize,
+    /// Number of modes.
+    pub modes: usize,
+    /// Residual thresholds at the start (p).
+    pub thresholds: Vec<f64>,
+}
+
+/// The controller's variables.
+///
+/// Inputs `y`, `y_ref`, `mode`, `mode_real`; outputs `u`, `x_hat`, `f_hat`, `residual`, `fault`;
+/// tunable parameters `ftc_enabled`, `threshold`.
+pub fn controller(interface: &Interface) -> VariableTable {
+    let inputs = &named("u", &interface.inputs);
+    let outputs = &named("y", &interface.outputs);
+    let states = &named("x", &interface.states);
+    let references = interface.references(outputs);
+    let mut table = VariableTable::new();
+
+    let input = Maker::input();
+    table.extend(input.vector("y", "Measured", Role::Measurement, outputs, Range::Open));
+    table.extend(input.vector(
+        "y_ref",
+        "Reference of",
+        Role::Reference,
+        &references,
+        Range::Closed,
+    ));
+    let mode = table.push(input.mode("mode", Role::Mode, "Active mode", interface.modes));
+    let real = table.push(input.mode_real("mode_real", Role::ModeReal, interface.modes));
+
+    let output = Maker::output();
+    table.extend(output.vector("u", "Command of", Role::Command, inputs, Range::Closed));
+    table.extend(output.vector(
+        "x_hat",
+        "Estimate of",
+        Role::StateEstimate,
+        states,
+        Range::Open,
+    ));
+    table.extend(output.vector(
+        "f_hat",
+        "Estimated sensor fault of",
+        Role::FaultEstimate,
+        &deviations(outputs),
+        Range::Open,
+    ));
+    table.extend(output.vector(
+        "residual",
+        "Measured less predicted",
+        Role::Residual,
+        &deviations(outputs),
+        Range::Open,
+    ));
+    table.extend(outputs.iter().enumerate().map(|(at, signal)| {
+        output.boolean(
+            format!("fault[{}]", at + 1),
+            format!("Sensor fault flagged on {}", signal.name),
+            Role::FaultFlag,
+            false,
+        )
+    }));
+
+    let tunable = Maker::parameter(Variability::Tunable);
+    table.push(tunable.boolean(
+        "ftc_enabled".into(),
+        "Compensate sensor faults".into(),
+        Role::FtcEnabled,
+        true,
+    ));
+    let thresholds: Vec<SignalInfo> = outputs
+        .iter()
+        .zip(&interface.thresholds)
+        .map(|(signal, &start)| SignalInfo {
+            min: Some(0.0),
+            max: None,
+            start,
+            ..signal.clone()
+        })
+        .collect();
+    table.extend(tunable.vector(
+        "threshold",
+        "Residual that flags a fault of",
+        Role::Threshold,
+        &thresholds,
+        Range::Closed,
+    ));
+
+    let modes = vec![scalar(mode), scalar(real)];
+    // Before the first tick nothing is computed but the operating point of the active mode.
+    for role in [Role::Command, Role::StateEstimate] {
+        table.depend(role, |_| modes.clone());
+    }
+    table
+}
+
+/// The plant's variables.
+///
+/// Inputs `u`, `f_ext`, `w_ext`, `mode_ext`, `mode_ext_real`; outputs `y`, `y_true`, `x` and the
+/// scenario's `y_ref`, `mode`, `mode_real`, `f`, `w`; fixed parameters `scenario_enabled`,
+/// `noise_enabled`.
+pub fn plant(interface: &Interface) -> VariableTable {
+    let inputs = &named("u", &interface.inputs);
+    let outputs = &named("y", &interface.outputs);
+    let states = &named("x", &interface.states);
+    let references = interface.references(outputs);
+    let disturbances = named("w", &vec![SignalInfo::default(); interface.disturbances]);
+    let faults = deviations(outputs);
+    let mut table = VariableTable::new();
+
+    let input = Maker::input();
+    table.extend(input.vector("u", "Command of", Role::Command, inputs, Range::Closed));
+    let f_ext = table.extend(input.vector(
+        "f_ext",
+        "Sensor fault added to",
+        Role::ExternalFault,
+        &faults,
+        Range::Open,
+    ));
+    let w_ext = table.extend(input.vector(
+        "w_ext",
+        "Added disturbance",
+        Role::ExternalDisturbance,
+        &disturbances,
+        Range::Open,
+    ));
+    let external = "Active mode while the scenario is off";
+    let mode_ext =
+        scalar(table.push(input.mode("mode_ext", Role::ExternalMode, external, interface.modes)));
+    let mode_real = scalar(table.push(input.mode_real(
+        "mode_ext_real",
+        Role::ExternalModeReal,
+        interface.modes,
+    )));
+
+    let output = Maker::output();
+    table.extend(output.vector("y", "Measured", Role::Measurement, outputs, Range::Open));
+    table.extend(output.vector("y_true", "True", Role::TrueOutput, outputs, Range::Open));
+    table.extend(output.vector("x", "State", Role::State, states, Range::Open));
+    table.extend(output.vector(
+        "y_ref",
+        "Reference of",
+        Role::Reference,
+        &references,
+        Range::Open,
+    ));
+    table.push(output.mode("mode", Role::Mode, "Active mode", interface.modes));
+    table.push(output.mode_real("mode_real", Role::ModeReal, interface.modes));
+    table.extend(output.vector("f", "Sensor fault of", Role::Fault, &faults, Range::Open));
+    table.extend(output.vector(
+        "w",
+        "Disturbance",
+        Role::Disturbance,
+        &disturbances,
+        Range::Open,
+    ));
+
+    let fixed = Maker::parameter(Variability::Fixed);
+    let scenario = scalar(table.push(fixed.boolean(
+        "scenario_enabled".into(),
+        "Run the built-in reference, fault, disturbance and mode signals".into(),
+        Role::ScenarioEnabled,
+        true,
+    )));
+    let noise = scalar(table.push(fixed.boolean(
+        "noise_enabled".into(),
+        "Add the scenario's measurement noise".into(),
+        Role::NoiseEnabled,
+        true,
+    )));
+
+    let element = |span: Span, at: u32| scalar(span.first + at);
+    let mode = [mode_ext, mode_real, scenario];
+    let with = |more: &[Span]| [&mode[..], more].concat();
+    table.depend(Role::Measurement, |at| {
+        with(&[element(f_ext, at), w_ext, noise])
+    });
+    table.depend(Role::TrueOutput, |_| with(&[w_ext]));
+    table.depend(Role::State, |_| with(&[]));
+    table.depend(Role::Reference, |_| vec![scenario]);
+    table.depend(Role::Mode, |_| with(&[]));
+    table.depend(Role::ModeReal, |_| with(&[]));
+    table.depend(Role::Fault, |at| vec![element(f_ext, at), scenario]);
+    table.depend(Role::Disturbance, |at| vec![element(w_ext, at), scenario]);
+    table
+}
+
+impl Interface {
+    /// The tracked ones among the outputs; a position that is none is left out.
+    fn references(&self, outputs: &[SignalInfo]) -> Vec<SignalInfo> {
+        let tracked = self.tracked.iter();
+        tracked.filter_map(|&at| outputs.get(at).cloned()).collect()
+    }
+}
+
+/// The same signals, those without a name called `y[1]`, `y[2]` ... by their position.
+fn named(base: &str, signals: &[SignalInfo]) -> Vec<SignalInfo> {
+    let name = |(at, signal): (usize, &SignalInfo)| {
+        let mut signal = signal.clone();
+        if signal.name.is_empty() {
+            signal.name = format!("{base}[{}]", at + 1);
+        }
+        signal
+    };
+    signals.iter().enumerate().map(name).collect()
+}
+
+/// The same signals as differences: unit and magnitude remain, range and operating point go.
+fn deviations(signals: &[SignalInfo]) -> Vec<SignalInfo> {
+    signals
+        .iter()
+        .map(|signal| SignalInfo {
+            min: None,
+            max: None,
+            start: 0.0,
+            ..signal.clone()
+        })
+        .collect()
+}
+
+fn scalar(reference: u32) -> Span {
+    Span {
+        first: reference,
+        len: 1,
+    }
+}
+
+/// Whether the signal's range is declared.
+#[derive(Clone, Copy, PartialEq)]
+enum Range {
+    Open,
+    Closed,
+}
+
+/// Makes variables of one causality and variability.
+struct Maker {
+    causality: Causality,
+    variability: Variability,
+}
+
+impl Maker {
+    fn input() -> Self {
+        Self {
+            causality: Causality::Input,
+            variability: Variability::Discrete,
+        }
+    }
+
+    fn output() -> Self {
+        Self {
+            causality: Causality::Output,
+            variability: Variability::Discrete,
+        }
+    }
+
+    fn parameter(variability: Variability) -> Self {
+        Self {
+            causality: Causality::Parameter,
+            variability,
+        }
+    }
+
+    fn variable(
+        &self,
+        name: String,
+        description: String,
+        kind: Kind,
+        role: Role,
+        start: f64,
+    ) -> Variable {
+        Variable {
+            name,
+            description,
+            kind,
+            causality: self.causality,
+            variability: self.variability,
+            start,
+            role,
+            dependencies: Vec::new(),
+            initial_dependencies: Vec::new(),
+        }
+    }
+
+    fn vector(
+        &self,
+        base: &str,
+        what: &str,
+        role: Role,
+        signals: &[SignalInfo],
+        range: Range,
+    ) -> Vec<Variable> {
+        let make = |(at, signal): (usize, &SignalInfo)| {
+            let (min, max) = match range {
+                Range::Open => (None, None),
+                Range::Closed => (signal.min, signal.max),
+            };
+            let kind = Kind::Real {
+                unit: (!signal.unit.is_empty()).then(|| signal.unit.clone()),
+                display_unit: display_unit(&signal.unit).map(str::to_string),
+                nominal: signal.nominal,
+                min,
+                max,
+            };
+            let start = signal
+                .start
+                .max(min.unwrap_or(f64::NEG_INFINITY))
+                .min(max.unwrap_or(f64::INFINITY));
+            let name = format!("{base}[{}]", at + 1);
+            let description = format!("{what} {}", signal.name);
+            self.variable(name, description, kind, role, start)
+        };
+        signals.iter().enumerate().map(make).collect()
+    }
+
+    fn boolean(&self, name: String, description: String, role: Role, start: bool) -> Variable {
+        self.variable(
+            name,
+            description,
+            Kind::Boolean,
+            role,
+            f64::from(u8::from(start)),
+        )
+    }
+
+    fn mode(&self, name: &str, role: Role, what: &str, modes: usize) -> Variable {
+        let kind = Kind::Integer {
+            min: Some(1),
+            max: i32::try_from(modes).ok(),
+        };
+        self.variable(
+            name.into(),
+            format!("{what}, counted from 1"),
+            kind,
+            role,
+            1.0,
+        )
+    }
+
+    fn mode_real(&self, name: &str, role: Role, modes: usize) -> Variable {
+        let input = self.causality == Causality::Input;
+        let kind = Kind::Real {
+            unit: None,
+            display_unit: None,
+            nominal: None,
+            min: Some(if input { 0.0 } else { 1.0 }),
+            max: Some(modes as f64),
+        };
+        let (description, start) = if input {
+            (
+                "The mode as a Real, for tools that connect no Integer; 0 when not connected",
+                0.0,
+            )
+        } else {
+            ("The mode as a Real, for tools that connect no Integer", 1.0)
+        };
+        self.variable(name.into(), description.into(), kind, role, start)
+    }
+}

@@ -1,0 +1,60 @@
+"""What all Python tests share: the designs under test, each exported and simulated once."""
+
+from __future__ import annotations
+
+import functools
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import pytest
+
+import commands
+import design_file
+import record
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+    from pathlib import Path
+
+
+@dataclass(frozen=True)
+class Case:
+    """One design under test: its file, its FMUs, its record and its native run."""
+
+    path: Path
+    fmus: commands.Exported
+    record: dict
+    run: commands.Run
+
+
+def pytest_sessionstart() -> None:
+    """Refuses to start without the program under test."""
+    if not commands.PROGRAM.exists():
+        pytest.exit(f"{commands.PROGRAM} is missing: run `make build` first", returncode=2)
+
+
+def _case(path: Path, folder: Path) -> Case:
+    fmus = commands.export(path, folder)
+    return Case(path, fmus, record.load(fmus.controller), commands.simulate(path, folder))
+
+
+@pytest.fixture(scope="session")
+def make_case(tmp_path_factory: pytest.TempPathFactory) -> Callable[[dict], Case]:
+    """Returns a function that exports and simulates a design given as a dictionary."""
+
+    def make(design: dict) -> Case:
+        folder = tmp_path_factory.mktemp(design["name"])
+        return _case(design_file.write(design, folder), folder)
+
+    return make
+
+
+@pytest.fixture(scope="session")
+def example_case(tmp_path_factory: pytest.TempPathFactory) -> Callable[[str], Case]:
+    """Returns a function that exports and simulates one of the shipped examples, once a session."""
+
+    @functools.cache
+    def make(name: str) -> Case:
+        return _case(commands.ROOT / "examples" / f"{name}.toml", tmp_path_factory.mktemp(name))
+
+    return make

@@ -1,0 +1,79 @@
+"""Reading a finished design: the JSON record that the command line ships inside each FMU."""
+
+from __future__ import annotations
+
+import json
+import zipfile
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+RESOURCE = "resources/design.json"
+
+
+def load(path: Path) -> dict:
+    """Returns the record in a `.json` file, or the one zipped into an FMU."""
+    if path.suffix == ".fmu":
+        with zipfile.ZipFile(path) as archive:
+            return json.loads(archive.read(RESOURCE))
+    return json.loads(path.read_text())
+
+
+@dataclass(frozen=True)
+class Mode:
+    """One mode as an affine system: x+ = A x + B u + E w + a, y = C x + F w + c."""
+
+    A: np.ndarray
+    B: np.ndarray
+    C: np.ndarray
+    E: np.ndarray
+    F: np.ndarray
+    x0: np.ndarray
+    u0: np.ndarray
+    y0: np.ndarray
+
+    @property
+    def a(self) -> np.ndarray:
+        """Affine term of the state equation, which makes (x0, u0) a rest point."""
+        return self.x0 - self.A @ self.x0 - self.B @ self.u0
+
+    @property
+    def c(self) -> np.ndarray:
+        """Affine term of the output equation, which makes x0 read as y0."""
+        return self.y0 - self.C @ self.x0
+
+
+def _modes(plant: dict) -> list[Mode]:
+    return [
+        Mode(
+            **{key.upper(): np.array(mode[key], dtype=float) for key in "abcef"},
+            **{key + "0": np.array(mode["operating_point"][key], dtype=float) for key in "xuy"},
+        )
+        for mode in plant["modes"]
+    ]
+
+
+def modes(design: dict) -> list[Mode]:
+    """Returns the modes that the controller was designed for."""
+    return _modes(design["controller"]["plant"])
+
+
+def true_modes(design: dict) -> list[Mode]:
+    """Returns the modes of the simulated plant, which a scenario may set apart from the design's."""
+    truth = design["truth"]
+    match truth["kind"]:
+        case "as-designed":
+            return modes(design)
+        case "linear":
+            return _modes(truth["plant"])
+        case nonlinear:
+            raise ValueError(nonlinear)
+
+
+def sample_time(design: dict) -> float:
+    """Returns Te in seconds."""
+    return design["controller"]["plant"]["sample_time"]

@@ -1,0 +1,308 @@
+"""A second implementation of the closed loop, written from the theory and not from the software.
+
+Where the theory offers two forms this one takes the printed form: the observer keeps the state
+`z` of (11) with its matrices (F, T, L, H) formed explicitly; the response to the disturbance is
+a weighted least-squares fit solved anew at each tick from its normal equations; the leverage uses
+the inverse of the database's Gram matrix. Equality with the software to rounding is thus evidence.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from scipy.linalg import block_diag
+
+import record
+import scenario
+
+VARIANTS = ("ftc", "no_ftc", "told_the_fault")
+
+
+@dataclass
+class DisturbanceFit:
+    """Weighted least squares of one mode's response to the periodic disturbance.
+
+    Minimises sum keep^age |d - theta' h|^2 + keep^count |theta|^2 / variance.
+    """
+
+    information: np.ndarray
+    moment: np.ndarray
+    keep: float
+
+    @classmethod
+    def empty(cls, harmonics: dict, outputs: int) -> DisturbanceFit:
+        """Returns a fit that has seen no sample."""
+        size = 2 * harmonics["count"]
+        return cls(
+            np.eye(size) / harmonics["initial_variance"],
+            np.zeros((size, outputs)),
+            1.0 - 1.0 / max(harmonics["memory"], 2.0),
+        )
+
+    def response(self, h: np.ndarray) -> np.ndarray:
+        """Returns the fitted response to regressor `h`."""
+        return h @ np.linalg.solve(self.information, self.moment)
+
+    def leverage(self, h: np.ndarray) -> float:
+        """Returns the response's variance in units of the noise variance."""
+        return float(h @ np.linalg.solve(self.information, h))
+
+    def learn(self, h: np.ndarray, d: np.ndarray) -> None:
+        """Adds a healthy sample: `d` is what the disturbance added to the outputs."""
+        self.information = self.keep * self.information + np.outer(h, h)
+        self.moment = self.keep * self.moment + np.outer(h, d)
+
+
+@dataclass
+class FaultFlag:
+    """A flag that yields only to `debounce` contradicting samples in a row."""
+
+    debounce: int
+    up: bool = False
+    against: int = 0
+
+    def vote(self, *, faulty: bool, lost: bool) -> None:
+        """Counts one sample's verdict; a lost sensor raises the flag at once."""
+        self.against = 0 if faulty == self.up else self.against + 1
+        if self.against >= self.debounce or (lost and not self.up):
+            self.up, self.against = faulty, 0
+
+
+class Estimator:
+    """Sensor faults from the least-squares predictor of a healthy database, (55)-(60)."""
+
+    def __init__(self, design: dict) -> None:
+        """Prepares the estimator of a design record."""
+        self.modes = record.modes(design)
+        self.settings = design["controller"]["estimator"]
+        self.enabled = self.settings["method"] == "reference"
+        self.length = self.settings["response_length"]
+        self.outputs = len(self.modes[0].y0)
+        self.responses = [np.array(p["response"]) for p in self.settings["predictors"]]
+        factors = [np.array(p["factor"]) for p in self.settings["predictors"]]
+        self.dispersions = [np.linalg.inv(R.T @ R) for R in factors]
+        harmonics = self.settings["harmonics"]
+        self.fits = [DisturbanceFit.empty(harmonics, self.outputs) for _ in self.modes] if harmonics else None
+        self.flags = [FaultFlag(self.settings["debounce"]) for _ in range(self.outputs)]
+        self.past: list[np.ndarray] = []
+        self.hold = self.length
+        self.y_hat = np.zeros(self.outputs)
+        self.residual = np.zeros(self.outputs)
+        self.f_hat = np.zeros(self.outputs)
+
+    @property
+    def predicting(self) -> bool:
+        """Whether the prediction may stand in for a lost sensor."""
+        return self.enabled and self.hold == 0
+
+    def _wave(self, tick: int) -> np.ndarray:
+        harmonics = self.settings["harmonics"]
+        angle = 2 * math.pi * math.fmod(tick, harmonics["period"]) / harmonics["period"]
+        orders = range(1, harmonics["count"] + 1)
+        return np.array([part(h * angle) for h in orders for part in (math.sin, math.cos)])
+
+    def judge(self, tick: int, mode: int, y: np.ndarray, *, switched: bool) -> None:
+        """Predicts the output, takes the residual, decides sensor by sensor and learns when all are healthy."""
+        if switched:
+            self.hold = self.length
+        present = np.isfinite(y)
+        if not self.enabled:
+            self._decide(present, trusted=False, widening=1.0)
+            return
+        phi = np.concatenate([u - self.modes[mode].u0 for u in self.past[-self.length :]])
+        undisturbed = self.modes[mode].y0 + self.responses[mode] @ phi
+        distance = float(phi @ self.dispersions[mode] @ phi)
+        self.y_hat, spread = undisturbed, 1.0 + distance
+        if self.fits:
+            h = self._wave(tick)
+            self.y_hat = undisturbed + self.fits[mode].response(h)
+            spread += self.fits[mode].leverage(h)
+        self.residual = np.where(present, y - self.y_hat, self.residual)
+        trusted = self.hold == 0 and distance <= self.settings["leverage_limit"]
+        healthy = self._decide(present, trusted=trusted, widening=math.sqrt(spread))
+        if healthy and self.fits:
+            self.fits[mode].learn(h, y - undisturbed)
+        self.hold = max(self.hold - 1, 0)
+
+    def _decide(self, present: np.ndarray, *, trusted: bool, widening: float) -> bool:
+        """Votes on each sensor's flag and sets f_hat; says whether every sensor was judged and found healthy."""
+        all_well = trusted and bool(present.all())
+        for i, flag in enumerate(self.flags):
+            if present[i] and not trusted:
+                continue
+            beyond = abs(self.residual[i]) > widening * self.settings["thresholds"][i]
+            flag.vote(faulty=bool(beyond or not present[i]), lost=not present[i])
+            largest = self.settings["largest_fault"][i]
+            if not flag.up:
+                self.f_hat[i] = 0.0
+            elif present[i]:
+                self.f_hat[i] = np.clip(self.residual[i], -largest, largest)
+            all_well = all_well and not flag.up and not beyond
+        return all_well
+
+
+class Observer:
+    """The observer (11): z+ = F z + T B u + L y, x_hat = z + H y, in physical units."""
+
+    def __init__(self, design: dict) -> None:
+        """Prepares the observer of a design record."""
+        self.modes = record.modes(design)
+        settings = design["controller"]["observer"]
+        self.K = [np.array(K) for K in settings["gains"]]
+        self.H = [[np.array(H) for H in row] for row in settings["decoupling"]]
+        self.x_hat = np.zeros(0)
+        self.prior = np.zeros(0)
+        self.pending: tuple | None = None
+
+    def predict(self, mode: int) -> np.ndarray:
+        """Returns the output expected in `mode` before it is measured."""
+        return self.modes[mode].C @ self.prior + self.modes[mode].c
+
+    def start(self, mode: int) -> None:
+        """Rests at the mode's operating point."""
+        self.prior = self.modes[mode].x0
+
+    def correct(self, mode: int, y: np.ndarray) -> None:
+        """Takes the measurement that arrives in `mode`: forms z from the sample just ended, then x_hat = z + H y."""
+        now = self.modes[mode]
+        if self.pending is None:
+            H = self.H[mode][mode]
+            z = (np.eye(len(now.x0)) - H @ now.C) @ now.x0 - H @ now.c
+        else:
+            z_old, H_old, left, u, y_old = self.pending
+            was = self.modes[left]
+            H = self.H[left][mode]
+            T = np.eye(len(now.x0)) - H @ now.C
+            F = T @ was.A - self.K[left] @ was.C
+            L = self.K[left] + F @ H_old
+            offset = T @ was.a - self.K[left] @ was.c - H @ now.c
+            z = F @ z_old + T @ was.B @ u + L @ y_old + offset
+        self.x_hat = z + H @ y
+        self.z_and_H = (z, H)
+
+    def advance(self, mode: int, u: np.ndarray, y: np.ndarray) -> None:
+        """Notes the input that acts over the coming sample."""
+        now = self.modes[mode]
+        self.pending = (*self.z_and_H, mode, u, y)
+        self.prior = now.A @ self.x_hat + now.B @ u + now.a
+
+
+class InternalModel:
+    """Integrators of the tracking error and resonators beside them: Z+ = M Z + N Te e."""
+
+    def __init__(self, design: dict) -> None:
+        """Forms M and N: one integrator per tracked output, then one rotation per resonator and output."""
+        feedback = design["controller"]["feedback"]
+        r = len(feedback["tracked"])
+        turns = [
+            np.array([[math.cos(angle), -math.sin(angle)], [math.sin(angle), math.cos(angle)]])
+            for angle in feedback["resonators"]
+        ]
+        self.M = block_diag(np.eye(r), *(np.kron(np.eye(r), turn) for turn in turns))
+        self.N = np.vstack([np.eye(r), *(np.kron(np.eye(r), [[1.0], [0.0]]) for _ in turns)])
+
+
+@dataclass
+class Loop:
+    """The closed loop of a design record, controller first and then plant."""
+
+    design: dict
+    noise: np.ndarray
+
+    @cached_property
+    def modes(self) -> list[record.Mode]:
+        """The modes as designed for."""
+        return record.modes(self.design)
+
+    @cached_property
+    def true_modes(self) -> list[record.Mode]:
+        """The modes of the plant behind the sensors."""
+        return record.true_modes(self.design)
+
+    def signals(self, tick: int) -> tuple[int, np.ndarray, np.ndarray, np.ndarray]:
+        """Returns mode (0-based), reference, disturbance and additive fault of a tick."""
+        te, plan = record.sample_time(self.design), self.design["scenario"]
+        values = [
+            np.array([scenario.waveform(s, tick, te) for s in plan[key]])
+            for key in ("reference", "disturbance", "fault")
+        ]
+        return scenario.active_mode(plan["schedule"], tick, te), *values
+
+    def command(self, mode: int, x_hat: np.ndarray, Z: np.ndarray, u_old: np.ndarray) -> np.ndarray:
+        """Returns the command before saturation: u0 + K (x_hat - x0) + G Z + V (u_old - u0)."""
+        gains = self.design["controller"]["feedback"]["modes"][mode]
+        point = self.modes[mode]
+        K, G, V = (np.array(gains[key]) for key in ("state_feedback", "integral", "previous_input"))
+        u = point.u0 + K @ (x_hat - point.x0) + G @ Z
+        return u + V @ (u_old - point.u0) if V.size else u
+
+    def saturate(self, u: np.ndarray) -> np.ndarray:
+        """Clamps a command to the input limits."""
+        limits = self.design["controller"]["input_limits"]
+        low = [-math.inf if entry["min"] is None else entry["min"] for entry in limits]
+        high = [math.inf if entry["max"] is None else entry["max"] for entry in limits]
+        return np.clip(u, low, high)
+
+    def trusted_fault(self, variant: str, f_hat: np.ndarray, f: np.ndarray) -> np.ndarray:
+        """Returns the fault that the variant takes out of the loop."""
+        if variant == "told_the_fault":
+            return f
+        compensated = variant == "ftc" and self.design["controller"]["compensation"] != "none"
+        return f_hat if compensated else np.zeros_like(f_hat)
+
+    def run(self, variant: str) -> dict[str, np.ndarray]:
+        """Runs one variant and returns its signals, one row per tick."""
+        te = record.sample_time(self.design)
+        feedback = self.design["controller"]["feedback"]
+        estimator, observer = Estimator(self.design), Observer(self.design)
+        mode = self.signals(0)[0]
+        start = self.modes[mode]
+        observer.start(mode)
+        sensors = scenario.Sensors(self.design["scenario"]["events"], self.true_modes[mode].y0.copy())
+        internal = InternalModel(self.design)
+        x, u, Z = self.true_modes[mode].x0, start.u0, np.zeros(len(internal.M))
+        estimator.past = [u] * estimator.length
+        rows: dict[str, list] = {}
+        for tick in range(self.design["scenario"]["steps"]):
+            left = mode
+            mode, y_ref, w, additive = self.signals(tick)
+            now = self.true_modes[mode]
+            y_true = now.C @ x + now.F @ w + now.c
+            y = sensors.read(y_true, self.noise[tick], additive, tick, te)
+
+            estimator.judge(tick, mode, y, switched=mode != left)
+            substitute = estimator.y_hat if estimator.predicting else observer.predict(mode)
+            fault = self.trusted_fault(variant, estimator.f_hat, sensors.fault)
+            y_c = np.where(np.isfinite(y), y - fault, substitute)
+            observer.correct(mode, y_c)
+            if mode != left and feedback["bumpless"]:
+                G = np.array(feedback["modes"][mode]["integral"])
+                Z = Z + np.linalg.pinv(G) @ (u - self.command(mode, observer.x_hat, Z, u))
+            wanted = self.command(mode, observer.x_hat, Z, u)
+            u_old, u = u, self.saturate(wanted)
+            acting = u_old if feedback["latency"] else u
+
+            unwinding = np.array(feedback["modes"][mode]["anti_windup"])
+            Z = internal.M @ Z + internal.N @ (te * (y_ref - y_c[feedback["tracked"]])) + unwinding @ (u - wanted)
+            observer.advance(mode, acting, y_c)
+            estimator.past.append(acting)
+            for name, value in {
+                "mode": [mode + 1],
+                "y_ref": y_ref,
+                "w": w,
+                "f": sensors.fault,
+                "y": y,
+                "y_true": y_true,
+                "x": x,
+                "u": u,
+                "x_hat": observer.x_hat,
+                "f_hat": estimator.f_hat,
+                "residual": estimator.residual,
+                "fault": [float(flag.up) for flag in estimator.flags],
+            }.items():
+                rows.setdefault(name, []).append(np.array(value, dtype=float))
+            x = now.A @ x + now.B @ acting + now.E @ w + now.a
+        return {name: np.array(values) for name, values in rows.items()}

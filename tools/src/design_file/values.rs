@@ -1,0 +1,53 @@
+//! Values that may be written in more than one way.
+
+use serde::de::{Deserialize, Deserializer, Error, SeqAccess, Visitor};
+use std::fmt;
+
+/// One number for every channel, or a list with one for each.
+#[derive(Clone, Debug, PartialEq)]
+pub enum NumberOrList {
+    /// The same for all.
+    Number(f64),
+    /// One each.
+    List(Vec<f64>),
+}
+
+impl NumberOrList {
+    /// One value per channel; says what is wrong with the count.
+    pub fn spread(&self, channels: usize) -> Result<Vec<f64>, String> {
+        match self {
+            Self::Number(value) => Ok(vec![*value; channels]),
+            Self::List(values) if values.len() == channels => Ok(values.clone()),
+            Self::List(values) => Err(format!(
+                "has {} entries: give one number, or a list of {channels}",
+                values.len()
+            )),
+        }
+    }
+}
+
+impl<'de> Deserialize<'de> for NumberOrList {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        struct Either;
+        impl<'de> Visitor<'de> for Either {
+            type Value = NumberOrList;
+            fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+                f.write_str("a number or a list of numbers")
+            }
+            fn visit_f64<E: Error>(self, value: f64) -> Result<NumberOrList, E> {
+                Ok(NumberOrList::Number(value))
+            }
+            fn visit_i64<E: Error>(self, value: i64) -> Result<NumberOrList, E> {
+                Ok(NumberOrList::Number(value as f64))
+            }
+            fn visit_seq<A: SeqAccess<'de>>(self, mut list: A) -> Result<NumberOrList, A::Error> {
+                let mut values = Vec::new();
+                while let Some(value) = list.next_element()? {
+                    values.push(value);
+                }
+                Ok(NumberOrList::List(values))
+            }
+        }
+        deserializer.deserialize_any(Either)
+    }
+}

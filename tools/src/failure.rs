@@ -1,0 +1,81 @@
+//! Why a command ends without success, and with which exit code.
+
+use crate::summary;
+use ftc::design::{ControlSpec, DesignError};
+use std::fmt;
+use std::path::Path;
+use std::process::ExitCode;
+
+/// Why a command failed.
+#[derive(Debug)]
+pub enum Failure {
+    /// Something the user gave is at fault; one sentence says what and what to do.
+    Input(String),
+    /// The inputs are sound, but there is no such controller, or none that can be certified.
+    NoDesign {
+        /// The design file.
+        file: String,
+        /// What was asked for.
+        asked: Box<ControlSpec>,
+        /// Why not.
+        error: Box<DesignError>,
+        /// What to print to standard output beside the error.
+        output: Option<String>,
+    },
+}
+
+impl Failure {
+    /// Sorts a design error: an ill-formed request is the design file's fault.
+    pub fn new(path: &Path, asked: ControlSpec, error: DesignError) -> Self {
+        let file = path.display().to_string();
+        match error {
+            DesignError::Request(what) => Self::Input(format!("{file}: {what}")),
+            error => Self::NoDesign {
+                file,
+                asked: Box::new(asked),
+                error: Box::new(error),
+                output: None,
+            },
+        }
+    }
+
+    /// The same failure, with a JSON object for standard output where there is a verdict.
+    pub fn explained_in_json(self) -> Self {
+        match self {
+            Self::NoDesign {
+                file, asked, error, ..
+            } => Self::NoDesign {
+                output: Some(summary::json_of_failure(&asked, &error)),
+                file,
+                asked,
+                error,
+            },
+            input => input,
+        }
+    }
+
+    /// What goes to standard output.
+    pub fn output(&self) -> Option<&str> {
+        match self {
+            Self::Input(_) => None,
+            Self::NoDesign { output, .. } => output.as_deref(),
+        }
+    }
+
+    /// See the command line's help.
+    pub fn exit_code(&self) -> ExitCode {
+        match self {
+            Self::Input(_) => ExitCode::from(2),
+            Self::NoDesign { .. } => ExitCode::from(1),
+        }
+    }
+}
+
+impl fmt::Display for Failure {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Input(what) => f.write_str(what),
+            Self::NoDesign { file, error, .. } => write!(f, "{file}: {error}"),
+        }
+    }
+}

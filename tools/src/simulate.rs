@@ -1,0 +1,176 @@
+//! `simulate`: every variant of the loop natively, written down sample by sample.
+
+use crate::output::Staging;
+use crate::report;
+use ftc::control::Controller;
+use ftc::design::Design;
+use ftc::simulate::closed_loop::{Merits, Record};
+use ftc::simulate::{PlantSimulator, Trajectory, Variant, run};
+use serde_json::{Map, Value, json};
+use std::fmt::Write;
+
+/// Runs the scenario in every variant and writes `trajectories.csv` and `metrics.json`.
+///
+/// # Errors
+/// One sentence about the output directory.
+pub fn write(design: &Design, staging: Staging) -> Result<String, String> {
+    let report = staging.target("report.html");
+    let trajectories = trajectories(design);
+    let csv = table(design, &trajectories).map_err(|error| error.to_string())?;
+    staging.add("trajectories.csv", &csv)?;
+    staging.add("metrics.json", metrics(design, &trajectories).as_bytes())?;
+    report::write(design, &trajectories, &staging.folder().join("report.html"))
+        .map_err(|error| format!("{error:#}"))?;
+    staging.commit()?;
+    let mut text = summary(design, &trajectories);
+    let _ = writeln!(
+        text,
+        "wrote {}, trajectories.csv, metrics.json and the figures",
+        report.display()
+    );
+    Ok(text)
+}
+
+/// Every variant of the design's scenario.
+pub fn trajectories(design: &Design) -> Vec<Trajectory> {
+    let plant = PlantSimulator::with_truth(
+        design.controller.plant.clone(),
+        design.truth.clone(),
+        design.scenario.clone(),
+    );
+    let controller = Controller::new(design.controller.clone());
+    Variant::ALL
+        .iter()
+        .map(|&variant| run(&plant, &controller, variant))
+        .collect()
+}
+
+/// One row per sample: `t`, `mode` and the signals of the scenario, then those of each variant.
+fn table(design: &Design, trajectories: &[Trajectory]) -> Result<Vec<u8>, csv::Error> {
+    let mut writer = csv::Writer::from_writer(Vec::new());
+    let records = trajectories.first().map_or(&[][..], |run| &run.records);
+    if let Some(first) = records.first() {
+        writer.write_record(header(first, trajectories))?;
+    }
+    let mut row = Vec::new();
+    for (at, record) in records.iter().enumerate() {
+        row.clear();
+        let time = record.tick as f64 * design.controller.plant.sample_time;
+        row.push(number(time));
+        row.push((record.mode + 1).to_string());
+        for (_, values) in shared(record) {
+            row.extend(values.iter().map(|&value| number(value)));
+        }
+        for trajectory in trajectories {
+            let record = &trajectory.records[at];
+            for (_, values) in own(record) {
+                row.extend(values.iter().map(|&value| number(value)));
+            }
+            row.extend(
+                record
+                    .flagged
+                    .iter()
+                    .map(|&flag| u8::from(flag).to_string()),
+            );
+        }
+        writer.write_record(&row)?;
+    }
+    writer
+        .into_inner()
+        .map_err(|error| error.into_error().into())
+}
+
+/// Signals that are the same in every variant.
+fn shared(record: &Record) -> [(&'static str, &[f64]); 4] {
+    [
+        ("y_ref", &record.reference),
+        ("w", &record.disturbance),
+        ("f", &record.fault),
+        ("noise", &record.noise),
+    ]
+}
+
+/// Signals of one variant; the flags follow them.
+fn own(record: &Record) -> [(&'static str, &[f64]); 7] {
+    [
+        ("y", &record.y),
+        ("y_true", &record.y_true),
+        ("x", &record.x),
+        ("u", &record.u),
+        ("x_hat", &record.x_hat),
+        ("f_hat", &record.f_hat),
+        ("residual", &record.residual),
+    ]
+}
+
+fn header(record: &Record, trajectories: &[Trajectory]) -> Vec<String> {
+    let vector = |prefix: &str, name: &str, size: usize| -> Vec<String> {
+        (1..=size).map(|i| format!("{prefix}{name}[{i}]")).collect()
+    };
+    let mut names = vec!["t".to_string(), "mode".to_string()];
+    for (name, values) in shared(record) {
+        names.extend(vector("", name, values.len()));
+    }
+    for trajectory in trajectories {
+        let prefix = format!("{}.", trajectory.variant.key());
+        for (name, values) in own(record) {
+            names.extend(vector(&prefix, name, values.len()));
+        }
+        names.extend(vector(&prefix, "fault", record.flagged.len()));
+    }
+    names
+}
+
+/// The shortest text that reads back as the same double.
+fn number(value: f64) -> String {
+    format!("{value:?}")
+}
+
+/// Per variant `mse` and `vaf`, each measured and true, one number per tracked output.
+fn metrics(design: &Design, trajectories: &[Trajectory]) -> String {
+    let tracked = &design.controller.feedback.tracked;
+    let of = |trajectory: &Trajectory| {
+        let merits = trajectory.merits(tracked);
+        let list = |pick: fn(&Merits) -> f64| merits.iter().map(pick).collect::<Vec<f64>>();
+        let value = json!({
+            "mse": { "measured": list(|m| m.measured.mse), "true": list(|m| m.truth.mse) },
+            "vaf": { "measured": list(|m| m.measured.vaf), "true": list(|m| m.truth.vaf) },
+        });
+        (trajectory.variant.key().to_string(), value)
+    };
+    let variants: Map<String, Value> = trajectories.iter().map(of).collect();
+    format!("{:#}\n", Value::Object(variants))
+}
+
+/// The same as a small table for a person.
+fn summary(design: &Design, trajectories: &[Trajectory]) -> String {
+    let mut text = format!(
+        "{}: {} samples of {} s\n\n{:<16}{:<12}{:>14}{:>14}{:>12}{:>12}\n",
+        design.name,
+        design.scenario.steps,
+        design.controller.plant.sample_time,
+        "variant",
+        "output",
+        "MSE measured",
+        "MSE true",
+        "VAF meas. %",
+        "VAF true %",
+    );
+    let tracked = &design.controller.feedback.tracked;
+    for trajectory in trajectories {
+        for (merits, &output) in trajectory.merits(tracked).iter().zip(tracked) {
+            let _ = writeln!(
+                text,
+                "{:<16}{:<12}{:>14.5e}{:>14.5e}{:>12.3}{:>12.3}",
+                trajectory.variant.key(),
+                design.signals.outputs[output].name,
+                merits.measured.mse,
+                merits.truth.mse,
+                merits.measured.vaf,
+                merits.truth.vaf,
+            );
+        }
+    }
+    text.push('\n');
+    text
+}
