@@ -119,13 +119,10 @@ impl<'a> Scene<'a> {
             label,
         )
         .with(
-            Series::new(
-                "measured (with FTC)",
-                self.points(run, |record| record.y[output]),
-            )
-            .ink(Ink::Faint)
-            .weight(Weight::Thin)
-            .secondary(),
+            Series::new("measured", self.points(run, |record| record.y[output]))
+                .ink(Ink::Faint)
+                .weight(Weight::Thin)
+                .secondary(),
         );
         for series in self.variants(|record| record.y_true[output]) {
             figure = figure.with(series);
