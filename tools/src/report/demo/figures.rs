@@ -119,13 +119,10 @@ impl<'a> Scene<'a> {
             label,
         )
         .with(
-            Series::new(
-                "measured (with FTC)",
-                self.points(run, |record| record.y[output]),
-            )
-            .ink(Ink::Faint)
-            .weight(Weight::Thin)
-            .secondary(),
+            Series::new("measured", self.points(run, |record| record.y[output]))
+                .ink(Ink::Faint)
+                .weight(Weight::Thin)
+                .secondary(),
         );
         for series in self.variants(|record| record.y_true[output]) {
             figure = figure.with(series);
@@ -244,19 +241,19 @@ impl<'a> Scene<'a> {
             Variant::ToldTheFault,
             Variant::Ftc,
         ]
-            .into_iter()
-            .filter_map(|variant| find(self.trajectories, variant))
-            .map(|run| {
-                let series = Series::new(variant_name(run.variant), self.points(run, &signal));
-                match run.variant {
-                    Variant::Ftc => series.ink(Ink::Blue),
-                    Variant::NoFtc => series.ink(Ink::Vermilion).dash(Dash::Dashed).secondary(),
-                    Variant::ToldTheFault => series.ink(Ink::Green).weight(Weight::Broad),
-                    Variant::Additive => series.ink(Ink::Purple).dash(Dash::Dotted).secondary(),
-                    Variant::Predictive => series.ink(Ink::Purple).dash(Dash::Dashed),
-                }
-            })
-            .collect()
+        .into_iter()
+        .filter_map(|variant| find(self.trajectories, variant))
+        .map(|run| {
+            let series = Series::new(variant_name(run.variant), self.points(run, &signal));
+            match run.variant {
+                Variant::Ftc => series.ink(Ink::Blue),
+                Variant::NoFtc => series.ink(Ink::Vermilion).dash(Dash::Dashed).secondary(),
+                Variant::ToldTheFault => series.ink(Ink::Green).weight(Weight::Broad),
+                Variant::Additive => series.ink(Ink::Purple).dash(Dash::Dotted).secondary(),
+                Variant::Predictive => series.ink(Ink::Purple).dash(Dash::Dashed),
+            }
+        })
+        .collect()
     }
 
     fn points(&self, run: &Trajectory, signal: impl Fn(&Record) -> f64) -> Vec<Point> {

@@ -2,7 +2,7 @@
 
 use super::{find, name_of, unit_of, variant_name};
 use crate::report::page::{Column, Row, Table};
-use crate::report::text::{aligned, number, with_unit};
+use crate::report::text::{aligned, number, significant, with_unit};
 use ftc::control::parameters::EstimatorMethod;
 use ftc::design::Design;
 use ftc::simulate::{Trajectory, Variant};
@@ -28,9 +28,9 @@ pub fn merits(design: &Design, trajectories: &[Trajectory]) -> Table {
                         String::new()
                     },
                     variant_name(*variant).into(),
-                    number(merit.truth.mse),
+                    significant(merit.truth.mse),
                     aligned(merit.truth.vaf, 2),
-                    number(merit.measured.mse),
+                    significant(merit.measured.mse),
                     aligned(merit.measured.vaf, 2),
                 ],
                 emphasised: *variant == Variant::Ftc,
