@@ -48,11 +48,24 @@ fn every_example_is_designed_and_simulated() {
         let bench = Bench::empty();
         let run = bench.run(&["simulate", path.to_str().unwrap(), "--out", "out"]);
         assert_eq!(run.code(), 0, "{}: {}", path.display(), run.stderr());
-        let metrics: Value = serde_json::from_slice(&fs::read(bench.path("out/metrics.json")).unwrap()).unwrap();
+        let metrics: Value =
+            serde_json::from_slice(&fs::read(bench.path("out/metrics.json")).unwrap()).unwrap();
         let mse = |variant: &str| numbers(&metrics[variant]["mse"]["true"]);
-        for ((ftc, without), told) in mse("ftc").iter().zip(mse("no_ftc")).zip(mse("told_the_fault")) {
-            assert!(*ftc <= 1.05 * told, "{}: {ftc} against {told}", path.display());
-            assert!(without >= 10.0 * ftc, "{}: {without} against {ftc}", path.display());
+        for ((ftc, without), told) in mse("ftc")
+            .iter()
+            .zip(mse("no_ftc"))
+            .zip(mse("told_the_fault"))
+        {
+            assert!(
+                *ftc <= 1.05 * told,
+                "{}: {ftc} against {told}",
+                path.display()
+            );
+            assert!(
+                without >= 10.0 * ftc,
+                "{}: {without} against {ftc}",
+                path.display()
+            );
         }
     }
     assert!(examples >= 3);
@@ -62,16 +75,30 @@ fn every_example_is_designed_and_simulated() {
 fn the_text_report_names_what_an_engineer_looks_for() {
     let run = Bench::new(SOUND).run(&["design", FILE]);
     for word in [
-        "gamma", "spectral radius", "decay asked", "observer", "response length",
-        "residual deviation", "thresholds", "arbitrary switching", "proved",
+        "gamma",
+        "spectral radius",
+        "decay asked",
+        "observer",
+        "response length",
+        "residual deviation",
+        "thresholds",
+        "arbitrary switching",
+        "proved",
     ] {
-        assert!(run.stdout().contains(word), "no '{word}' in\n{}", run.stdout());
+        assert!(
+            run.stdout().contains(word),
+            "no '{word}' in\n{}",
+            run.stdout()
+        );
     }
 }
 
 #[test]
 fn an_infeasible_design_says_what_conflicts_and_what_to_try() {
-    let bench = Bench::new(damaged("decay = 0.7\noutput", "decay = 0.001\noutput").replace("latency = 0", "latency = 1"));
+    let bench = Bench::new(
+        damaged("decay = 0.7\noutput", "decay = 0.001\noutput")
+            .replace("latency = 0", "latency = 1"),
+    );
     let run = bench.run(&["design", FILE, "--json"]);
     assert_eq!(run.code(), 1, "{}", run.stderr());
     let report = run.json();
@@ -93,7 +120,9 @@ fn advice_is_worth_following() {
     assert_eq!(run.code(), 1, "{}", run.stderr());
     let advice = run.json()["advice"].to_string();
     assert!(advice.contains("dwell"), "{advice}");
-    let followed = latency.replace("\"common\"", "\"dwell\"").replace("decay = 0.7\noutput", "decay = 0.9\noutput");
+    let followed = latency
+        .replace("\"common\"", "\"dwell\"")
+        .replace("decay = 0.7\noutput", "decay = 0.9\noutput");
     let run = Bench::new(followed).run(&["design", FILE, "--json"]);
     assert_eq!(run.code(), 0, "{}", run.stderr());
     assert!(run.json()["dwell_time_samples"].as_f64().unwrap() > 0.0);
@@ -102,7 +131,10 @@ fn advice_is_worth_following() {
 #[test]
 fn quiet_prints_nothing() {
     let run = Bench::new(SOUND).run(&["--quiet", "simulate", FILE, "--out", "out"]);
-    assert_eq!((run.code(), run.stdout(), run.stderr()), (0, String::new(), String::new()));
+    assert_eq!(
+        (run.code(), run.stdout(), run.stderr()),
+        (0, String::new(), String::new())
+    );
 }
 
 #[test]
@@ -114,7 +146,14 @@ fn defaults_make_a_complete_design() {
 
 #[test]
 fn methods_kept_for_comparison_run() {
-    for (from, to) in [("\"reference\"", "\"sliding\""), ("\"reference\"", "\"none\""), ("\"virtual-sensor\"", "\"additive\""), ("\"virtual-sensor\"", "\"none\""), ("\"commission\"", "\"model\""), ("latency = 0", "bumpless = true")] {
+    for (from, to) in [
+        ("\"reference\"", "\"sliding\""),
+        ("\"reference\"", "\"none\""),
+        ("\"virtual-sensor\"", "\"additive\""),
+        ("\"virtual-sensor\"", "\"none\""),
+        ("\"commission\"", "\"model\""),
+        ("latency = 0", "bumpless = true"),
+    ] {
         let run = Bench::new(damaged(from, to)).run(&["simulate", FILE, "--out", "out"]);
         assert_eq!(run.code(), 0, "{to}: {}", run.stderr());
     }
@@ -130,8 +169,13 @@ fn the_table_of_trajectories_is_complete_and_reads_back_exactly() {
         assert!(header.contains(&name.to_string()), "{name}");
     }
     for variant in ["ftc", "no_ftc", "told_the_fault"] {
-        for signal in ["y", "y_true", "x", "u", "x_hat", "f_hat", "residual", "fault"] {
-            assert!(header.contains(&format!("{variant}.{signal}[2]")), "{variant}.{signal}");
+        for signal in [
+            "y", "y_true", "x", "u", "x_hat", "f_hat", "residual", "fault",
+        ] {
+            assert!(
+                header.contains(&format!("{variant}.{signal}[2]")),
+                "{variant}.{signal}"
+            );
         }
     }
     let rows: Vec<csv::StringRecord> = reader.records().map(Result::unwrap).collect();
@@ -148,7 +192,10 @@ fn the_table_of_trajectories_is_complete_and_reads_back_exactly() {
         assert_eq!(cell(row, "mode"), if row < 30 { 1.0 } else { 2.0 });
         // A healthy sensor reads the truth, its noise and nothing else.
         if cell(row, "f[1]") == 0.0 && row < 50 {
-            assert_eq!(cell(row, "ftc.y[1]"), cell(row, "ftc.y_true[1]") + cell(row, "noise[1]"));
+            assert_eq!(
+                cell(row, "ftc.y[1]"),
+                cell(row, "ftc.y_true[1]") + cell(row, "noise[1]")
+            );
         }
     }
 }
@@ -163,7 +210,11 @@ fn a_table_from_csv_drives_the_reference() {
     let run = bench.run(&["simulate", FILE, "--out", "out"]);
     assert_eq!(run.code(), 0, "{}", run.stderr());
     let text = fs::read_to_string(bench.path("out/trajectories.csv")).unwrap();
-    let references: Vec<&str> = text.lines().skip(1).map(|row| row.split(',').nth(3).unwrap()).collect();
+    let references: Vec<&str> = text
+        .lines()
+        .skip(1)
+        .map(|row| row.split(',').nth(3).unwrap())
+        .collect();
     assert_eq!(references[..3], ["0.25", "-0.5", "-0.5"]);
 }
 
@@ -175,8 +226,14 @@ fn a_second_run_replaces_the_first() {
     fs::write(bench.path("out/metrics.json"), "old").unwrap();
     fs::write(bench.path("out/mine.txt"), "kept").unwrap();
     assert_eq!(bench.run(&["simulate", FILE, "--out", "out"]).code(), 0);
-    assert_ne!(fs::read_to_string(bench.path("out/metrics.json")).unwrap(), "old");
-    assert_eq!(fs::read_to_string(bench.path("out/mine.txt")).unwrap(), "kept");
+    assert_ne!(
+        fs::read_to_string(bench.path("out/metrics.json")).unwrap(),
+        "old"
+    );
+    assert_eq!(
+        fs::read_to_string(bench.path("out/mine.txt")).unwrap(),
+        "kept"
+    );
     assert_eq!(bench.files().len(), first.len() + 1);
 }
 
@@ -224,7 +281,10 @@ fn export_without_binaries_says_what_to_run() {
     let output = export(&bench, &program, "out");
     assert_eq!(output.status.code(), Some(2));
     let message = String::from_utf8(output.stderr).unwrap();
-    assert!(message.contains("cargo build --release --workspace"), "{message}");
+    assert!(
+        message.contains("cargo build --release --workspace"),
+        "{message}"
+    );
     assert_eq!(message.trim_end().lines().count(), 1, "{message}");
     assert_eq!(bench.files(), before);
 }
@@ -243,8 +303,15 @@ fn an_fmu_holds_every_platform_that_is_there_and_belongs_to_its_design() {
     );
     let output = export(&bench, &program, "out");
     let said = String::from_utf8(output.stdout).unwrap();
-    assert!(said.contains("platforms: linux64, win64"), "{said}{}", String::from_utf8_lossy(&output.stderr));
-    for (kind, binary) in [("controller", model_description::CONTROLLER), ("plant", model_description::PLANT)] {
+    assert!(
+        said.contains("platforms: linux64, win64"),
+        "{said}{}",
+        String::from_utf8_lossy(&output.stderr)
+    );
+    for (kind, binary) in [
+        ("controller", model_description::CONTROLLER),
+        ("plant", model_description::PLANT),
+    ] {
         let files = unzip(&bench.path(&format!("out/sound_{kind}.fmu")));
         let names: Vec<&str> = files.keys().map(String::as_str).collect();
         assert_eq!(
@@ -260,18 +327,31 @@ fn an_fmu_holds_every_platform_that_is_there_and_belongs_to_its_design() {
         );
         let design = &files["resources/design.json"];
         let xml = String::from_utf8(files["modelDescription.xml"].clone()).unwrap();
-        assert!(xml.contains(&model_description::guid(binary, design)), "{xml}");
+        assert!(
+            xml.contains(&model_description::guid(binary, design)),
+            "{xml}"
+        );
         assert!(xml.contains(&format!("modelIdentifier=\"sound_{kind}\"")));
         let record: ftc::design::Design = serde_json::from_slice(design).unwrap();
         assert_eq!(record.name, "sound");
-        record.synthesis.unwrap().verify(&record.controller.plant).unwrap();
+        record
+            .synthesis
+            .unwrap()
+            .verify(&record.controller.plant)
+            .unwrap();
     }
 }
 
 #[test]
 fn the_same_design_gives_the_same_bytes() {
     let bench = Bench::new(SOUND);
-    let program = installed(&bench, &["fmu-binaries/linux64/ftc_controller.so", "fmu-binaries/linux64/ftc_plant.so"]);
+    let program = installed(
+        &bench,
+        &[
+            "fmu-binaries/linux64/ftc_controller.so",
+            "fmu-binaries/linux64/ftc_plant.so",
+        ],
+    );
     for out in ["one", "two"] {
         assert!(export(&bench, &program, out).status.success());
     }
