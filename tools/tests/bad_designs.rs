@@ -102,8 +102,8 @@ fn keys() {
         (
             "unknown key in a mode",
             "E = [[1.0], [1.0]]\noperating",
-            "Emil = [[1.0], [1.0]]\noperating",
-            &["mode 1: Emil is not a known key", "use one of"],
+            "Q = [[1.0], [1.0]]\noperating",
+            &["mode 1: Q is not a known key", "use one of"],
         ),
         (
             "unknown key of a signal",
@@ -348,13 +348,19 @@ fn the_plant() {
             "B = [[1.0, 1.0], [1.0, 1.0]]",
             &["mode 1", "uncontrollable", "track fewer outputs"],
         ),
-        (
-            "disturbance hidden from the outputs",
-            "C = [[1.0, 0.0], [0.0, 1.0]]\nE = [[1.0], [1.0]]\noper",
-            "C = [[1.0, -1.0], [2.0, -2.0]]\nE = [[1.0], [1.0]]\noper",
-            &["mode 1", "rank"],
-        ),
     ]);
+}
+
+#[test]
+fn a_disturbance_hidden_from_the_sensors() {
+    let hidden = SOUND
+        .replace(
+            "C = [[1.0, 0.0], [0.0, 1.0]]",
+            "C = [[1.0, -1.0], [2.0, -2.0]]",
+        )
+        .replace("tracked = [1, 2]", "tracked = [1]")
+        .replace(", { kind = \"square\", amplitude = 1, period = 20 }", "");
+    refused("rank(CE) < rank(E)", hidden, &["mode 1", "rank"]);
 }
 
 #[test]
@@ -646,7 +652,7 @@ fn the_scenario() {
             "more than a computer can count",
             "steps = 60",
             "steps = 90000000000000000000000",
-            &["line 55"],
+            &["line 49", "scenario.steps"],
         ),
         (
             "negative noise",
@@ -853,7 +859,7 @@ fn syntax_errors_keep_line_and_column() {
     refused(
         "no value",
         damaged("seed = 3", "seed ="),
-        &["line 57", "correct the syntax"],
+        &["line 51", "correct the syntax"],
     );
     refused(
         "unclosed text",
@@ -863,7 +869,7 @@ fn syntax_errors_keep_line_and_column() {
     refused(
         "a table header torn open",
         damaged("[observer]", "[observer"),
-        &["line 37", "correct the syntax"],
+        &["line 35", "correct the syntax"],
     );
 }
 
@@ -913,7 +919,7 @@ fn ten_megabytes_of_noise() {
 fn not_utf8() {
     let latin = SOUND.replace("\"first\"", "\"pr\u{e9}mier\"");
     let bytes: Vec<u8> = latin.chars().map(|c| c as u32 as u8).collect();
-    refused("Latin-1", bytes, &["is not UTF-8", "byte 48"]);
+    refused("Latin-1", bytes, &["is not UTF-8", "byte 54"]);
     let utf16: Vec<u8> = SOUND.encode_utf16().flat_map(u16::to_le_bytes).collect();
     refused("UTF-16", utf16, &["line 1"]);
 }

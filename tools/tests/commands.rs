@@ -264,10 +264,11 @@ fn unzip(path: &Path) -> BTreeMap<String, Vec<u8>> {
     let mut order = Vec::new();
     for index in 0..archive.len() {
         let mut file = archive.by_index(index).unwrap();
+        let name = file.name().unwrap().into_owned();
         let mut bytes = Vec::new();
         file.read_to_end(&mut bytes).unwrap();
-        order.push(file.name().to_string());
-        files.insert(file.name().to_string(), bytes);
+        order.push(name.clone());
+        files.insert(name, bytes);
     }
     assert!(order.is_sorted(), "{order:?}");
     files
