@@ -26,11 +26,25 @@ use crate::rows;
 use nalgebra::DMatrix;
 use serde::{Deserialize, Serialize};
 
-/// A Lyapunov matrix `S` of the function `x' S^-1 x`, in the certificate's units.
+/// A Lyapunov matrix `S = L M L'` of the function `x' S^-1 x`, in the certificate's units.
+///
+/// `L` carries the bad conditioning, so that the proof, stated in the coordinates `L^-1 x`, does not
+/// drown in rounding.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct FactoredLyapunov {
+    /// `L` (d x d), regular.
+    #[serde(with = "rows")]
+    pub basis: DMatrix<f64>,
+    /// `M` (d x d), symmetric and positive definite.
+    #[serde(with = "rows")]
+    pub core: DMatrix<f64>,
+}
+
+/// A Lyapunov matrix `P` of the function `e' P e`, in the certificate's units.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(transparent)]
 pub struct LyapunovMatrix(
-    /// Symmetric, positive definite (d x d).
+    /// Symmetric, positive definite (n x n).
     #[serde(with = "rows")]
     pub DMatrix<f64>,
 );
@@ -41,7 +55,7 @@ pub struct ControlCertificate {
     /// Units (powers of two) in which the inequalities are stated.
     pub units: Units,
     /// One matrix for `common`, else one per mode.
-    pub lyapunov: Vec<LyapunovMatrix>,
+    pub lyapunov: Vec<FactoredLyapunov>,
 }
 
 /// Why a certificate does not check.
@@ -92,6 +106,70 @@ impl ClosedLoop {
     }
 }
 
+#[cfg(feature = "design")]
+impl FactoredLyapunov {
+    /// `S` itself, with `L = I`.
+    pub(crate) fn plain(core: DMatrix<f64>) -> Self {
+        Self {
+            basis: DMatrix::identity(core.nrows(), core.nrows()),
+            core,
+        }
+    }
+}
+
+/// A Lyapunov matrix as the proof uses it: any regular `X` will do, `X = L^-1` up to rounding is best.
+struct Coordinates {
+    /// `X`.
+    outward: Enclosure,
+    /// `L`.
+    basis: Enclosure,
+    /// `M (X L)'`.
+    right: Enclosure,
+    /// `X S X'`, near `M`.
+    whole: Enclosure,
+}
+
+impl Coordinates {
+    fn new(lyapunov: &FactoredLyapunov) -> Option<Self> {
+        let outward = Enclosure::exact(lyapunov.basis.clone().try_inverse()?);
+        let basis = Enclosure::exact(lyapunov.basis.clone());
+        let core = Enclosure::exact(lyapunov.core.clone());
+        if lyapunov.core != lyapunov.core.transpose() {
+            return None;
+        }
+        let shape = &outward * &basis;
+        let right = &core * &shape.transpose();
+        Some(Self {
+            whole: (&shape * &right).symmetric_part(),
+            outward,
+            basis,
+            right,
+        })
+    }
+
+    /// `matrix S X'` for a matrix that multiplies the state.
+    fn after(&self, matrix: &Enclosure) -> Enclosure {
+        &(matrix * &self.basis) * &self.right
+    }
+
+    /// `X S_other X'` of another Lyapunov matrix.
+    fn view(&self, other: &FactoredLyapunov) -> Enclosure {
+        let shape = &self.outward * &Enclosure::exact(other.basis.clone());
+        let right = &Enclosure::exact(other.core.clone()) * &shape.transpose();
+        (&shape * &right).symmetric_part()
+    }
+}
+
+/// The coordinates of every Lyapunov matrix.
+fn coordinates(matrices: &[FactoredLyapunov]) -> Result<Vec<Coordinates>, CertificateError> {
+    let singular =
+        |mode: usize| CertificateError::Unproved(BlockName::new(BlockKind::Lyapunov, mode, mode));
+    let numbered = matrices.iter().enumerate();
+    numbered
+        .map(|(mode, matrix)| Coordinates::new(matrix).ok_or_else(|| singular(mode)))
+        .collect()
+}
+
 /// Proves everything a state feedback claims: decay, attenuation, dwell time.
 pub(crate) fn verify_state_feedback(
     plant: &SwitchedPlant,
@@ -105,15 +183,11 @@ pub(crate) fn verify_state_feedback(
         .zip(&design.modes)
         .map(|(model, gains)| ClosedLoop::new(model, scaled_gain(gains, units, spec.latency)))
         .collect();
-    let matrices: Vec<Enclosure> = certificate
-        .lyapunov
-        .iter()
-        .map(|matrix| Enclosure::exact(matrix.0.clone()))
-        .collect();
-    let lyapunov = |mode: usize| &matrices[spec.lyapunov.index(mode)];
+    let coordinates = coordinates(&certificate.lyapunov)?;
+    let lyapunov = |mode: usize| &coordinates[spec.lyapunov.index(mode)];
 
     for (i, j) in spec.lyapunov.pairs(modes) {
-        let decay = decay_block(&loops[i].a, lyapunov(i), lyapunov(j), spec.decay);
+        let decay = decay_block(&loops[i], lyapunov(i), lyapunov(j), spec.decay);
         prove(&decay, BlockKind::Decay, i, j)?;
         if let Some(gamma) = &design.gamma {
             let level = gamma[i] * units.disturbance / units.performance;
@@ -122,38 +196,48 @@ pub(crate) fn verify_state_feedback(
         }
     }
     match &design.dwell {
-        Some(dwell) => prove_dwell(&matrices, dwell, spec.decay, plant.sample_time),
+        Some(dwell) => prove_dwell(&certificate.lyapunov, dwell, spec.decay, plant.sample_time),
         None => Ok(()),
     }
 }
 
-/// `[alpha^2 S_i (A S_i)'; . S_j]`.
-fn decay_block(a: &Enclosure, own: &Enclosure, next: &Enclosure, decay: f64) -> Enclosure {
-    let size = own.shape().0;
+/// `[alpha^2 S_i (A S_i)'; . S_j]`, each block seen through the `X` of its mode.
+fn decay_block(
+    closed: &ClosedLoop,
+    own: &Coordinates,
+    next: &Coordinates,
+    decay: f64,
+) -> Enclosure {
+    let size = own.whole.shape().0;
+    let reduced = &Enclosure::square_times_identity(decay, size) * &own.whole;
     Enclosure::symmetric_blocks(&[
-        vec![&Enclosure::square_times_identity(decay, size) * own],
-        vec![a * own, next.clone()],
+        vec![reduced.symmetric_part()],
+        vec![own.after(&(&next.outward * &closed.a)), next.whole.clone()],
     ])
 }
 
-/// `[S_i 0 (A S_i)' (H S_i)'; . gamma^2 I E' 0; . . S_j 0; . . . I]`.
+/// `[S_i 0 (A S_i)' (H S_i)'; . gamma^2 I E' 0; . . S_j 0; . . . I]`, seen likewise.
 fn attenuation_block(
     closed: &ClosedLoop,
-    own: &Enclosure,
-    next: &Enclosure,
+    own: &Coordinates,
+    next: &Coordinates,
     gamma: f64,
 ) -> Enclosure {
     let (size, disturbances) = closed.e.shape();
     let signals = closed.h.shape().0;
     Enclosure::symmetric_blocks(&[
-        vec![own.clone()],
+        vec![own.whole.clone()],
         vec![
             Enclosure::zeros(disturbances, size),
             Enclosure::square_times_identity(gamma, disturbances),
         ],
-        vec![&closed.a * own, closed.e.clone(), next.clone()],
         vec![
-            &closed.h * own,
+            own.after(&(&next.outward * &closed.a)),
+            &next.outward * &closed.e,
+            next.whole.clone(),
+        ],
+        vec![
+            own.after(&closed.h),
             Enclosure::zeros(signals, disturbances),
             Enclosure::zeros(signals, size),
             Enclosure::exact(DMatrix::identity(signals, signals)),
@@ -163,18 +247,22 @@ fn attenuation_block(
 
 /// `mu S_j - S_i` for every switch from `i` to `j`, and the dwell time that follows from `mu`.
 fn prove_dwell(
-    matrices: &[Enclosure],
+    matrices: &[FactoredLyapunov],
     dwell: &DwellTime,
     decay: f64,
     sample_time: f64,
 ) -> Result<(), CertificateError> {
     check_dwell(dwell, decay, sample_time)?;
-    for (i, own) in matrices.iter().enumerate() {
-        for (j, next) in matrices.iter().enumerate().filter(|(j, _)| *j != i) {
-            let factor = DMatrix::from_diagonal_element(own.shape().0, own.shape().0, dwell.mu);
-            let ratio = &(&Enclosure::exact(factor) * next) - own;
-            prove(&ratio, BlockKind::LyapunovRatio, i, j)?;
-        }
+    let coordinates = coordinates(matrices)?;
+    for (i, j) in all_pairs(matrices.len())
+        .into_iter()
+        .filter(|(i, j)| i != j)
+    {
+        let next = &coordinates[j];
+        let size = next.whole.shape().0;
+        let factor = Enclosure::exact(DMatrix::from_diagonal_element(size, size, dwell.mu));
+        let ratio = &(&factor * &next.whole) - &next.view(&matrices[i]);
+        prove(&ratio.symmetric_part(), BlockKind::LyapunovRatio, i, j)?;
     }
     Ok(())
 }
@@ -289,23 +377,26 @@ pub(crate) fn observer_growth(plant: &SwitchedPlant, design: &ObserverDesign) ->
 /// that can be proved.
 #[cfg(feature = "design")]
 pub(crate) fn provable_dwell(
-    matrices: &[DMatrix<f64>],
+    matrices: &[FactoredLyapunov],
     decay: f64,
     sample_time: f64,
 ) -> Result<DwellTime, CertificateError> {
+    let coordinates = coordinates(matrices)?;
     let mut mu = 1.0_f64;
     for (i, j) in all_pairs(matrices.len()) {
-        let ratio = largest_ratio(&matrices[i], &matrices[j])
+        let next = &coordinates[j];
+        let own = next.view(&matrices[i]).into_midpoint();
+        let whole = next.whole.clone().into_midpoint();
+        let ratio = largest_ratio(&own, &whole)
             .ok_or_else(|| CertificateError::Unproved(BlockName::new(BlockKind::Lyapunov, j, j)))?;
         mu = mu.max(ratio);
     }
-    let enclosed: Vec<Enclosure> = matrices.iter().cloned().map(Enclosure::exact).collect();
     let mut outcome = Err(CertificateError::Malformed(
         "no dwell time was tried".into(),
     ));
     for allowance in DwellTime::ALLOWANCES {
         let dwell = DwellTime::new(mu * (1.0 + allowance), decay, sample_time);
-        outcome = prove_dwell(&enclosed, &dwell, decay, sample_time).map(|()| dwell);
+        outcome = prove_dwell(matrices, &dwell, decay, sample_time).map(|()| dwell);
         if outcome.is_ok() {
             break;
         }
@@ -393,7 +484,7 @@ fn check_sizes(plant: &SwitchedPlant, design: &StateFeedback) -> Result<(), Cert
         && certificate
             .lyapunov
             .iter()
-            .all(|matrix| matrix.0.shape() == (size, size));
+            .all(|matrix| [&matrix.basis, &matrix.core].map(DMatrix::shape) == [(size, size); 2]);
     let gamma_fits = design
         .gamma
         .as_ref()

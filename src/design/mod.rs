@@ -3,6 +3,8 @@
 //! The data types and the certificate need no solver; making gains does (feature `design`).
 
 #[cfg(feature = "design")]
+pub mod as_printed;
+#[cfg(feature = "design")]
 pub mod assembly;
 pub mod augmented;
 pub mod certificate;

@@ -18,6 +18,8 @@ pub enum BlockKind {
     LyapunovRatio,
     /// The Lyapunov matrix itself is positive definite.
     Lyapunov,
+    /// A theorem as the paper prints it.
+    Printed,
 }
 
 /// The name of an inequality: its kind, the mode, and the mode that follows it.
@@ -50,6 +52,7 @@ impl fmt::Display for BlockName {
             BlockKind::ObserverDecay => "observer decay",
             BlockKind::LyapunovRatio => "Lyapunov ratio",
             BlockKind::Lyapunov => "Lyapunov matrix",
+            BlockKind::Printed => "printed inequality",
         };
         write!(f, "{kind} of mode {}", self.mode)?;
         if self.successor != self.mode {
@@ -216,22 +219,28 @@ pub enum DesignError {
     Uncertified(#[from] super::CertificateError),
 }
 
-/// The verdict on a conflict: blocks by weight, the heaviest first.
+/// The verdict on a conflict.
 #[cfg(feature = "design")]
 pub(crate) fn infeasible(
     margin: f64,
     weights: Vec<(BlockName, f64)>,
     advice: Vec<Advice>,
 ) -> DesignError {
+    DesignError::Infeasible(Infeasibility {
+        margin: margin.min(0.0),
+        blocks: by_weight(weights),
+        advice,
+    })
+}
+
+/// The blocks that carry a conflict, the heaviest first.
+#[cfg(feature = "design")]
+pub(crate) fn by_weight(weights: Vec<(BlockName, f64)>) -> Vec<ConflictingBlock> {
     let mut blocks: Vec<ConflictingBlock> = weights
         .into_iter()
         .filter(|(_, weight)| *weight > 1e-3)
         .map(|(name, weight)| ConflictingBlock { name, weight })
         .collect();
     blocks.sort_by(|x, y| y.weight.total_cmp(&x.weight));
-    DesignError::Infeasible(Infeasibility {
-        margin: margin.min(0.0),
-        blocks,
-        advice,
-    })
+    blocks
 }

@@ -14,28 +14,38 @@ import shutil
 import subprocess
 import tempfile
 import time
-from pathlib import Path
+from typing import TYPE_CHECKING, Self
+
+if TYPE_CHECKING:
+    from pathlib import Path
 
 NAMES = ("chromium-headless-shell", "chromium", "chromium-browser", "google-chrome")
+
+
+class BrowserError(Exception):
+    """Chromium refused a command, or is no longer there."""
 
 
 class Chromium:
     """One browser with one blank page; a context manager."""
 
     def __init__(self, timeout: float = 60.0) -> None:
+        """Waits at most `timeout` seconds for any answer."""
         self.timeout = timeout
         self.events: list[dict] = []
         self._count = 0
         self._buffer = b""
         self._profile = tempfile.TemporaryDirectory(ignore_cleanup_errors=True)
 
-    def __enter__(self) -> Chromium:
+    def __enter__(self) -> Self:
+        """Starts the browser and opens a blank page."""
         program = next((path for name in NAMES if (path := shutil.which(name))), None)
         if program is None:
-            raise SystemExit("no Chromium found: run tests/browser/install.sh")
+            sentence = "no Chromium found: run tests/browser/install.sh"
+            raise SystemExit(sentence)
         commands_out, self._commands = os.pipe()
         self._answers, answers_in = os.pipe()
-        # Descriptors 3 and 4 may be in use here: move ours out of the way first, then into place.
+        # The shell moves our pipe ends, whatever their numbers, to the descriptors 3 and 4.
         arguments = [
             program,
             "--headless",
@@ -50,7 +60,7 @@ class Chromium:
         ]
         script = f'exec "$@" 3<&{commands_out} 4>&{answers_in}'
         self._process = subprocess.Popen(
-            ["bash", "-c", script, "chromium", *arguments],
+            [shutil.which("bash") or "/bin/bash", "-c", script, "chromium", *arguments],
             pass_fds=(commands_out, answers_in),
             stdout=subprocess.DEVNULL,
             stderr=subprocess.DEVNULL,
@@ -65,6 +75,7 @@ class Chromium:
         return self
 
     def __exit__(self, *_: object) -> None:
+        """Ends the browser and forgets its profile."""
         self._process.kill()
         self._process.wait()
         os.close(self._commands)
@@ -84,7 +95,7 @@ class Chromium:
             answer = self._read()
             if answer.get("id") == self._count:
                 if "error" in answer:
-                    raise RuntimeError(f"{method}: {answer['error']['message']}")
+                    raise BrowserError(method, answer["error"]["message"])
                 return answer["result"]
 
     def open(self, page: Path, width: int, scheme: str, media: str = "screen") -> None:
@@ -106,11 +117,9 @@ class Chromium:
 
     def evaluate(self, expression: str) -> object:
         """The value of a JavaScript expression on the page."""
-        answer = self.send(
-            "Runtime.evaluate", expression=expression, returnByValue=True, awaitPromise=True
-        )
+        answer = self.send("Runtime.evaluate", expression=expression, returnByValue=True, awaitPromise=True)
         if "exceptionDetails" in answer:
-            raise RuntimeError(answer["exceptionDetails"]["text"])
+            raise BrowserError(expression, answer["exceptionDetails"]["text"])
         return answer["result"].get("value")
 
     def screenshot(self, file: Path) -> None:
@@ -142,10 +151,12 @@ class Chromium:
         while b"\0" not in self._buffer:
             left = end - time.monotonic()
             if left <= 0 or not select.select([self._answers], [], [], left)[0]:
-                raise TimeoutError(f"Chromium said nothing for {self.timeout} s")
+                sentence = f"silent for {self.timeout} s"
+                raise BrowserError(sentence)
             chunk = os.read(self._answers, 1 << 16)
             if not chunk:
-                raise RuntimeError("Chromium ended unexpectedly")
+                sentence = "ended unexpectedly"
+                raise BrowserError(sentence)
             self._buffer += chunk
         text, _, self._buffer = self._buffer.partition(b"\0")
         message = json.loads(text)

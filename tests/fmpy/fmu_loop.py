@@ -123,7 +123,7 @@ def run(pair: Exported, steps: int, schedule: Schedule | None = None, *, ftc_ena
         controller.set("ftc_enabled", [ftc_enabled])
         plant.initialize(schedule.start_time)
         controller.initialize(schedule.start_time, inputs_from=plant)
-        size = schedule.step * plant.description.defaultExperiment.stepSize
+        size = schedule.step * float(plant.description.defaultExperiment.stepSize)
         rows: dict[str, list[np.ndarray]] = {name: [] for name in (*FROM_PLANT, *FROM_CONTROLLER)}
         for index in range(0, steps, schedule.exchange_every):
             for name in FROM_PLANT:
@@ -147,6 +147,8 @@ def differing(loop: dict, trajectories: object, variant: str) -> list[str]:
     """Returns the signals of a loop that are not, bit for bit, those of a native run's variant."""
     different = []
     for name, values in loop.items():
+        if name == "f" and variant != "ftc":
+            continue  # the table has it once: what a stuck sensor adds depends on the run
         shared = name in {"mode", "y_ref", "w", "f"}
         native = trajectories[name if shared else f"{variant}.{name}"]
         if not np.array_equal(values, native[: len(values)], equal_nan=True):

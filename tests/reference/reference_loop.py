@@ -31,6 +31,7 @@ class DisturbanceFit:
     information: np.ndarray
     moment: np.ndarray
     keep: float
+    samples: int = 0
 
     @classmethod
     def empty(cls, harmonics: dict, outputs: int) -> DisturbanceFit:
@@ -42,9 +43,32 @@ class DisturbanceFit:
             1.0 - 1.0 / max(harmonics["memory"], 2.0),
         )
 
+    @property
+    def known(self) -> bool:
+        """Whether there are four samples or more for each coefficient."""
+        return self.samples >= 4 * len(self.information)
+
+    @property
+    def theta(self) -> np.ndarray:
+        """The coefficients: sine and cosine of each harmonic in turn, one column per output."""
+        return np.linalg.solve(self.information, self.moment)
+
     def response(self, h: np.ndarray) -> np.ndarray:
         """Returns the fitted response to regressor `h`."""
-        return h @ np.linalg.solve(self.information, self.moment)
+        return h @ self.theta
+
+    def carry_over(self, other: DisturbanceFit, ratios: list[np.ndarray], deviations: np.ndarray) -> None:
+        """Starts from another mode's fit: the phasor of each harmonic times the ratio of the modes' responses.
+
+        A tenth of the result, in noise deviations of the sensor where it is largest, is added as doubt.
+        """
+        phasors = other.theta[0::2] + 1j * other.theta[1::2]
+        carried = np.array([ratio @ phasor for ratio, phasor in zip(ratios, phasors, strict=True)])
+        theta = np.empty_like(other.theta)
+        theta[0::2], theta[1::2] = carried.real, carried.imag
+        doubt = 0.1 * (np.linalg.norm(theta, axis=0) / deviations).max()
+        self.information = np.linalg.inv(np.linalg.inv(other.information) + doubt**2 * np.eye(len(theta)))
+        self.moment = self.information @ theta
 
     def leverage(self, h: np.ndarray) -> float:
         """Returns the response's variance in units of the noise variance."""
@@ -54,6 +78,13 @@ class DisturbanceFit:
         """Adds a healthy sample: `d` is what the disturbance added to the outputs."""
         self.information = self.keep * self.information + np.outer(h, h)
         self.moment = self.keep * self.moment + np.outer(h, d)
+        self.samples += 1
+
+
+def disturbance_response(mode: record.Mode, angle: float) -> np.ndarray:
+    """Returns the frequency response from disturbance to output, C (zI - A)^-1 E + F at z = exp(j angle)."""
+    z = np.exp(1j * angle)
+    return mode.C @ np.linalg.solve(z * np.eye(len(mode.A)) - mode.A, mode.E) + mode.F
 
 
 @dataclass
@@ -104,10 +135,20 @@ class Estimator:
         orders = range(1, harmonics["count"] + 1)
         return np.array([part(h * angle) for h in orders for part in (math.sin, math.cos)])
 
-    def judge(self, tick: int, mode: int, y: np.ndarray, *, switched: bool) -> None:
+    def enter(self, left: int, mode: int) -> None:
+        """Holds until the past inputs are those of the mode entered, which starts from what the mode left taught."""
+        self.hold = self.length
+        if not (self.fits and self.fits[left].known and not self.fits[mode].known):
+            return
+        harmonics = self.settings["harmonics"]
+        angles = [2 * math.pi * (h + 1) / harmonics["period"] for h in range(harmonics["count"])]
+        responses = [[disturbance_response(self.modes[i], angle) for i in (left, mode)] for angle in angles]
+        if any(response.any() for pair in responses for response in pair):
+            ratios = [entered @ np.linalg.pinv(was) for was, entered in responses]
+            self.fits[mode].carry_over(self.fits[left], ratios, np.array(self.settings["thresholds"]) / 6.0)
+
+    def judge(self, tick: int, mode: int, y: np.ndarray) -> None:
         """Predicts the output, takes the residual, decides sensor by sensor and learns when all are healthy."""
-        if switched:
-            self.hold = self.length
         present = np.isfinite(y)
         if not self.enabled:
             self._decide(present, trusted=False, widening=1.0)
@@ -121,7 +162,9 @@ class Estimator:
             self.y_hat = undisturbed + self.fits[mode].response(h)
             spread += self.fits[mode].leverage(h)
         self.residual = np.where(present, y - self.y_hat, self.residual)
-        trusted = self.hold == 0 and distance <= self.settings["leverage_limit"]
+        limit = self.settings["leverage_limit"]
+        unsure = spread > 1.0 + limit and any(flag.up for flag in self.flags)
+        trusted = self.hold == 0 and distance <= limit and not unsure
         healthy = self._decide(present, trusted=trusted, widening=math.sqrt(spread))
         if healthy and self.fits:
             self.fits[mode].learn(h, y - undisturbed)
@@ -273,7 +316,9 @@ class Loop:
             y_true = now.C @ x + now.F @ w + now.c
             y = sensors.read(y_true, self.noise[tick], additive, tick, te)
 
-            estimator.judge(tick, mode, y, switched=mode != left)
+            if mode != left:
+                estimator.enter(left, mode)
+            estimator.judge(tick, mode, y)
             substitute = estimator.y_hat if estimator.predicting else observer.predict(mode)
             fault = self.trusted_fault(variant, estimator.f_hat, sensors.fault)
             y_c = np.where(np.isfinite(y), y - fault, substitute)

@@ -141,7 +141,7 @@ def _least_eigenvalue(block: np.ndarray) -> float:
 
 def test_certificate(finished: Finished) -> None:
     """Every inequality (T2) of the shipped gains is positive definite with the shipped Lyapunov matrices."""
-    control = finished.record["synthesis"]["control"]
+    control = finished.record["synthesis"]["state_feedback"]
     units, gamma = control["certificate"]["units"], control["gamma"]
     matrices = [np.array(S) for S in control["certificate"]["lyapunov"]]
     assert len(matrices) == 1, "a common certificate has one matrix"

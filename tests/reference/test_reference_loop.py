@@ -23,9 +23,12 @@ def assert_agreement(case: Case) -> None:
     native = case.run.trajectories
     loop = reference_loop.Loop(case.record, native["noise"])
     for variant in reference_loop.VARIANTS:
-        for name, ours in loop.run(variant).items():
+        ours = loop.run(variant)
+        if variant != "ftc":
+            del ours["f"]  # the table has it once: what a stuck sensor adds depends on the run
+        for name, values in ours.items():
             column = name if name in SHARED else f"{variant}.{name}"
-            np.testing.assert_allclose(ours, native[column], rtol=1e-9, atol=1e-9, err_msg=column)
+            np.testing.assert_allclose(values, native[column], rtol=1e-9, atol=1e-9, err_msg=column)
 
 
 def harsh() -> dict:

@@ -12,6 +12,7 @@ mod export;
 mod failure;
 mod output;
 mod progress;
+#[allow(dead_code)]
 mod report;
 mod simulate;
 mod summary;

@@ -67,7 +67,9 @@ impl Staging {
     /// # Errors
     /// One sentence that names the directory.
     pub fn commit(mut self) -> Result<Vec<PathBuf>, String> {
-        let paths = self.move_files().map_err(|error| blame(&self.out, &error))?;
+        let paths = self
+            .move_files()
+            .map_err(|error| blame(&self.out, &error))?;
         self.made.clear();
         Ok(paths)
     }

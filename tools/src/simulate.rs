@@ -23,7 +23,11 @@ pub fn write(design: &Design, staging: Staging) -> Result<String, String> {
         .map_err(|error| format!("{error:#}"))?;
     staging.commit()?;
     let mut text = summary(design, &trajectories);
-    let _ = writeln!(text, "wrote {}, trajectories.csv, metrics.json and the figures", report.display());
+    let _ = writeln!(
+        text,
+        "wrote {}, trajectories.csv, metrics.json and the figures",
+        report.display()
+    );
     Ok(text)
 }
 

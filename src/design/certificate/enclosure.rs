@@ -48,10 +48,30 @@ impl Enclosure {
         }
     }
 
+    /// The midpoints.
+    pub fn midpoint(&self) -> &DMatrix<f64> {
+        &self.mid
+    }
+
+    /// The bounds on the distance from the midpoints.
+    pub fn radius(&self) -> &DMatrix<f64> {
+        &self.rad
+    }
+
     /// The midpoint, when the radius no longer matters.
     #[cfg(feature = "design")]
     pub(crate) fn into_midpoint(self) -> DMatrix<f64> {
         self.mid
+    }
+
+    /// Contains `(X + X') / 2` for every member `X`, hence every symmetric member; its own midpoint is
+    /// exactly symmetric.
+    pub fn symmetric_part(&self) -> Self {
+        let sum = self + &self.transpose();
+        Self {
+            mid: 0.5 * sum.mid,
+            rad: sum.rad.map(|radius| 0.5 * radius + UNDERFLOW),
+        }
     }
 
     /// Rows and columns.

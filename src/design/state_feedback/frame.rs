@@ -6,6 +6,7 @@
 //! is stated in the design's own units.
 
 use crate::design::augmented::AugmentedMode;
+use crate::design::certificate::FactoredLyapunov;
 use nalgebra::DMatrix;
 
 /// Gains and Lyapunov matrix of one mode.
@@ -16,13 +17,13 @@ pub(super) struct Part {
     /// `K~ = [K, K_u, G]` (m x d).
     pub gain: DMatrix<f64>,
     /// `S` (d x d).
-    pub lyapunov: DMatrix<f64>,
+    pub lyapunov: FactoredLyapunov,
 }
 
 /// A change of coordinates with units for disturbance and performance signal.
 #[derive(Clone, Debug)]
 pub(super) struct Frame {
-    /// `L`, lower triangular: `x~ = L xi`.
+    /// `L`: `x~ = L xi`.
     basis: DMatrix<f64>,
     inverse: DMatrix<f64>,
     disturbance: f64,
@@ -40,16 +41,15 @@ impl Frame {
         }
     }
 
-    /// Coordinates in which the mean Lyapunov matrix of a rough solution is the identity; `None`
-    /// when it is not positive definite.
+    /// Coordinates in which the mean Lyapunov matrix of a rough solution (found in one frame) is
+    /// the identity; `None` when it is not positive definite.
     fn of(parts: &[Part]) -> Option<Self> {
         let first = &parts.first()?.lyapunov;
-        let sum = parts
-            .iter()
-            .fold(0.0 * first, |sum, part| sum + &part.lyapunov);
-        let basis = (sum / parts.len() as f64).cholesky()?.unpack();
-        let identity = DMatrix::identity(first.nrows(), first.nrows());
-        let inverse = basis.solve_lower_triangular(&identity)?;
+        let cores = parts.iter().map(|part| &part.lyapunov.core);
+        let sum = cores.fold(0.0 * &first.core, |sum, core| sum + core);
+        let root = (sum / parts.len() as f64).cholesky()?.unpack();
+        let basis = &first.basis * root;
+        let inverse = basis.clone().try_inverse()?;
         let sound = inverse.iter().all(|value| value.is_finite());
         sound.then_some(Self {
             basis,
@@ -118,13 +118,13 @@ impl Frame {
 
     /// Solutions found in these coordinates, in the design's own.
     pub fn restore(&self, parts: Vec<Part>) -> Vec<Part> {
-        let back = |part: Part| {
-            let lyapunov = &self.basis * part.lyapunov * self.basis.transpose();
-            Part {
-                mode: part.mode,
-                gain: part.gain * &self.inverse,
-                lyapunov: (&lyapunov + lyapunov.transpose()) * (0.5 / self.performance.powi(2)),
-            }
+        let back = |part: Part| Part {
+            mode: part.mode,
+            gain: part.gain * &self.inverse,
+            lyapunov: FactoredLyapunov {
+                basis: &self.basis * part.lyapunov.basis,
+                core: part.lyapunov.core / self.performance.powi(2),
+            },
         };
         parts.into_iter().map(back).collect()
     }

@@ -9,7 +9,7 @@ use super::frame::{Frame, Part};
 use super::theorem;
 use super::{ModeGains, StateFeedback};
 use crate::design::augmented::{AugmentedMode, augment, scaled};
-use crate::design::certificate::{ControlCertificate, LyapunovMatrix, provable_dwell};
+use crate::design::certificate::{ControlCertificate, FactoredLyapunov, provable_dwell};
 use crate::design::lmi::Margin;
 use crate::design::verdict::{DesignError, SolverFailure, infeasible};
 use crate::design::{ControlSpec, Lyapunov, Objective, Units};
@@ -27,10 +27,10 @@ const SMALLEST_MARGIN: f64 = 1e-9;
 const THICK_MARGIN: f64 = 1e-2;
 
 /// How often better coordinates are sought.
-const REFRAMINGS: usize = 3;
+const REFRAMINGS: usize = 8;
 
-/// Relative duality gap at which an optimum is good to more digits than are reported.
-const SMALL_GAP: f64 = 1e-7;
+/// How well two solutions of the same optimum must agree, relatively.
+const AGREEMENT: f64 = 1e-6;
 
 /// Designs the state feedback that is asked for and proves it.
 ///
@@ -101,7 +101,7 @@ impl Road<'_> {
     }
 
     /// Stabilising gains of a group (T1): solved, and solved again in the coordinates the solution
-    /// suggests as long as its margin is thin and grows.
+    /// suggests as long as its margin is thin and doubles.
     fn stabilised(&self, group: &[usize]) -> Result<Verdict, SolverFailure> {
         let (margin, mut parts) = theorem::stabilise(&self.models, self.spec, group)?;
         if margin.margin < SMALLEST_MARGIN {
@@ -114,7 +114,7 @@ impl Road<'_> {
                 break;
             };
             match theorem::stabilise(&frame.view(&self.models), self.spec, group) {
-                Ok((margin, better)) if margin.margin > thickness => {
+                Ok((margin, better)) if margin.margin > 2.0 * thickness => {
                     thickness = margin.margin;
                     parts = frame.restore(better);
                 }
@@ -124,31 +124,27 @@ impl Road<'_> {
         Ok(Verdict::Stable(parts))
     }
 
-    /// The least `g` of a group, and coordinates in which (T2) is at ease near it.
+    /// The least `g` of a group, and coordinates in which (T2) is at ease near it: each solution's
+    /// coordinates serve the next, in which the optimum must be 1 once both agree.
     fn least_level(&self, group: &[usize], start: &[Part]) -> Result<(f64, Frame), SolverFailure> {
         let mut frame = Frame::of_stabilised(&self.models, start)
             .unwrap_or_else(|| Frame::identity(self.models[0].a.nrows()));
-        let mut best: Option<(f64, f64)> = None;
+        let mut found = None;
         for _ in 0..REFRAMINGS {
             let view = frame.view(&self.models);
             let Ok((candidate, parts)) = theorem::least_level(&view, self.spec, group) else {
                 break;
             };
             let level = frame.restore_level(candidate.objective);
-            let gap = (candidate.objective - candidate.bound).abs() / candidate.objective.abs();
-            if best.is_none_or(|(_, smallest)| gap < smallest) {
-                best = Some((level, gap));
-            }
-            let Some(better) = Frame::of_attenuated(&frame.restore(parts), level) else {
-                break;
-            };
-            frame = better;
-            if gap < SMALL_GAP {
-                break;
+            let agrees = (candidate.objective - 1.0).abs() < AGREEMENT;
+            found = Some((level, frame.clone()));
+            let better = Frame::of_attenuated(&frame.restore(parts), level);
+            match better.filter(|_| !agrees) {
+                Some(better) => frame = better,
+                None => break,
             }
         }
-        best.map(|(level, _)| (level, frame))
-            .ok_or(SolverFailure::NumericalTrouble)
+        found.ok_or(SolverFailure::NumericalTrouble)
     }
 
     /// Theorem T2: the least `gamma`, the gains that reach it but for a hair, and their proof.
@@ -187,11 +183,9 @@ impl Road<'_> {
         levels: Option<Levels>,
     ) -> Result<StateFeedback, DesignError> {
         let (spec, plant) = (self.spec, self.plant);
-        let distinct = spec.lyapunov.matrices(parts.len());
-        let matrices: Vec<DMatrix<f64>> = parts[..distinct]
-            .iter()
-            .map(|part| part.lyapunov.clone())
-            .collect();
+        let distinct = &parts[..spec.lyapunov.matrices(parts.len())];
+        let matrices: Vec<FactoredLyapunov> =
+            distinct.iter().map(|part| part.lyapunov.clone()).collect();
         let dwell = match spec.lyapunov {
             Lyapunov::Dwell => Some(provable_dwell(&matrices, spec.decay, plant.sample_time)?),
             Lyapunov::Common | Lyapunov::Switched => None,
@@ -212,7 +206,7 @@ impl Road<'_> {
             dwell,
             certificate: ControlCertificate {
                 units: self.units.clone(),
-                lyapunov: matrices.into_iter().map(LyapunovMatrix).collect(),
+                lyapunov: matrices,
             },
         };
         design.verify(plant)?;

@@ -2,9 +2,10 @@
 
 use super::frame::Part;
 use crate::design::augmented::AugmentedMode;
+use crate::design::certificate::FactoredLyapunov;
 use crate::design::lmi::{Affine, Candidate, Inequality, Margin, Problem, Variable};
 use crate::design::verdict::{BlockKind, BlockName, SolverFailure};
-use crate::design::{ControlSpec, Lyapunov};
+use crate::design::{ControlSpec, Lyapunov, pseudo_inverse};
 use nalgebra::DMatrix;
 
 /// The unknowns of one mode: `S`, `G + G' - S` as an expression, `G` and `R = K~ G`.
@@ -167,7 +168,7 @@ fn read(
             Ok(Part {
                 mode,
                 gain,
-                lyapunov: unknowns.lyapunov.value(scalars),
+                lyapunov: FactoredLyapunov::plain(unknowns.lyapunov.value(scalars)),
             })
         })
         .collect()
@@ -181,7 +182,12 @@ pub(super) fn stabilise(
 ) -> Result<(Margin, Vec<Part>), SolverFailure> {
     let (problem, unknowns) = stability(models, spec, group);
     let margin = problem.margin()?;
-    let parts = read(group, &unknowns, &margin.scalars)?;
+    let mut parts = read(group, &unknowns, &margin.scalars)?;
+    for part in &mut parts {
+        // Nothing in (T1) holds down what the inputs do to no state: take it out.
+        let input = &models[part.mode].b;
+        part.gain = pseudo_inverse(input, 1e-12) * (input * &part.gain);
+    }
     Ok((margin, parts))
 }
 

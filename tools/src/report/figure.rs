@@ -71,7 +71,7 @@ pub enum Dash {
     /// Dots.
     Dotted,
     /// Dash and dot in turn.
-    DashDot,
+    Chain,
 }
 
 /// The width of a line.

@@ -246,9 +246,9 @@ impl Table {
     fn render(&self) -> Markup {
         let caption = clean(&self.caption);
         html! {
+            p.caption { (caption) }
             div.table role="region" tabindex="0" aria-label=(caption) {
                 table {
-                    caption { (caption) }
                     thead {
                         tr {
                             @for column in &self.columns { th scope="col" class=(column.kind.class()) { (clean(&column.name)) } }

@@ -1,6 +1,6 @@
 //! A [`Figure`] drawn as SVG.
 //!
-//! The picture is 440 units wide and scales with its place; that width keeps the lettering readable
+//! The picture is 400 units wide and scales with its place; that width keeps the lettering readable
 //! from a phone to half a desktop page. Colours are CSS custom properties behind classes, with plain
 //! attributes beneath for viewers that know no CSS variables. Curves are drawn in tenths of a unit
 //! with relative whole-number coordinates, which keeps a page of thirty figures small.
@@ -8,18 +8,20 @@
 use super::axis::Axis;
 use super::decimate::{self, Point};
 use super::figure::{Dash, Figure, Ink, Mark, Series, Weight};
-use super::text::{clean, shorten, superscript};
+use super::text::{clean, superscript};
 use maud::{Markup, PreEscaped, html};
 use std::fmt::Write as _;
 
 /// Style rules every diagram needs, once per document.
 pub const STYLE: &str = include_str!("figure.css");
 
-const WIDTH: f64 = 440.0;
-const PLOT_HEIGHT: f64 = 168.0;
+const WIDTH: f64 = 400.0;
+const PLOT_HEIGHT: f64 = 164.0;
 const RIGHT: f64 = 14.0;
 const LEGEND_ROW: f64 = 18.0;
 const SWATCH: f64 = 26.0;
+/// How much wider the title is set than the rest.
+const BOLD: f64 = 1.28;
 /// Pixel columns a curve is resolved into: nearly two per unit of width.
 const COLUMNS: usize = 720;
 
@@ -59,7 +61,7 @@ impl Dash {
             Self::Solid => None,
             Self::Dashed => Some("70 40"),
             Self::Dotted => Some("1 36"),
-            Self::DashDot => Some("90 35 1 35"),
+            Self::Chain => Some("90 35 1 35"),
         }
     }
 }
@@ -148,7 +150,7 @@ impl<'a> Drawing<'a> {
                     rect x=(units(self.left)) y=(units(self.top)) width=(units(self.right() - self.left)) height=(units(PLOT_HEIGHT)) {}
                 }
                 rect class="paper" width=(WIDTH) height=(height) fill="#fff" {}
-                text class="title" x="6" y="17" font-weight="600" { (shorten(&title, 56)) }
+                text class="title" x="6" y="17" font-weight="600" { (fit(&title, (WIDTH - 12.0) / BOLD)) }
                 (self.draw_legend())
                 (self.draw_spans())
                 (self.draw_axes())
@@ -178,7 +180,7 @@ impl<'a> Drawing<'a> {
                         (stroke(series, &format!("M{} {}h{}", tenths(entry.x), tenths(entry.y - 4.0), tenths(SWATCH))))
                     }
                 } @else {
-                    rect class="shade" x=(units(entry.x)) y=(units(entry.y - 10.0)) width=(SWATCH) height="12" fill="#f3ddd0" {}
+                    rect class="shade" x=(units(entry.x)) y=(units(entry.y - 10.0)) width=(SWATCH) height="12" fill="#f9e7da" {}
                 }
                 text x=(units(entry.x + SWATCH + 6.0)) y=(units(entry.y)) { (entry.name) }
             }
@@ -190,7 +192,7 @@ impl<'a> Drawing<'a> {
             @for spans in &self.figure.spans {
                 @for [from, until] in merged(spans.intervals.iter().map(|[a, b]| [self.x_at(*a), self.x_at(*b)])) {
                     rect class="shade" x=(units(from)) y=(units(self.top)) width=(units(until - from)) height=(PLOT_HEIGHT)
-                        fill="#f3ddd0" clip-path={ "url(#" (self.id) "-clip)" } {}
+                        fill="#f9e7da" clip-path={ "url(#" (self.id) "-clip)" } {}
                 }
             }
         }
@@ -271,36 +273,39 @@ impl<'a> Drawing<'a> {
     }
 
     fn draw_marks(&self) -> Markup {
-        let mut free = f64::NEG_INFINITY;
+        let placed = self.place_marks();
+        html! {
+            @for (x, label) in placed {
+                path class="mark" d={ "M" (units(x)) " " (units(self.top)) "v" (units(PLOT_HEIGHT)) } fill="none" stroke="#59636e" stroke-dasharray="2 3" {}
+                @if let Some((start, label)) = label {
+                    text class="mark-label" x=(units(start)) y=(units(self.top - 5.0)) { (label) }
+                }
+            }
+        }
+    }
+
+    /// Where each mark stands, and where its label starts if there is room for it above the frame.
+    fn place_marks(&self) -> Vec<(f64, Option<(f64, String)>)> {
+        let mut free = 6.0 + width_of(&axis_label(&self.figure.y_label, &self.y)) + 8.0;
         let mut last = f64::NEG_INFINITY;
-        let mut placed: Vec<(f64, Option<(f64, String)>)> = Vec::new();
+        let mut placed = Vec::new();
         for Mark { at, label } in &self.figure.marks {
             let x = self.x_at(*at);
             if x - last < 2.0 {
                 continue;
             }
             last = x;
-            let label = shorten(&clean(label), 24);
+            let label = fit(&clean(label), 150.0);
             let width = width_of(&label);
-            let start = if x + 4.0 + width > self.right() {
-                x - 4.0 - width
-            } else {
-                x + 4.0
-            };
-            let fits = start > free && start > self.left;
+            let start = (x - 0.5 * width).min(self.right() - width).max(free);
+            // A label keeps touching the line it belongs to.
+            let fits = start <= x && start + width <= self.right() + 1.0;
             if fits {
                 free = start + width + 6.0;
             }
             placed.push((x, fits.then_some((start, label))));
         }
-        html! {
-            @for (x, label) in placed {
-                path class="mark" d={ "M" (units(x)) " " (units(self.top)) "v" (units(PLOT_HEIGHT)) } fill="none" stroke="#59636e" stroke-dasharray="2 3" {}
-                @if let Some((start, label)) = label {
-                    text class="mark-label" x=(units(start)) y=(units(self.top + 12.0)) { (label) }
-                }
-            }
-        }
+        placed
     }
 
     /// Names the curves that leave the picture.
@@ -318,7 +323,7 @@ impl<'a> Drawing<'a> {
         html! {
             @if !cut.is_empty() {
                 text class="remark" x=(units(self.right() - 4.0)) y=(units(self.bottom() - 6.0)) text-anchor="end" {
-                    (shorten(&format!("{} leaves the picture", cut.join(", ")), 60))
+                    (fit(&format!("{} leaves the picture", cut.join(", ")), WIDTH - 80.0))
                 }
             }
         }
@@ -376,7 +381,7 @@ fn place_legend(figure: &Figure) -> Vec<Entry<'_>> {
     let (mut x, mut y) = (6.0, 37.0);
     let mut entries = Vec::new();
     for (name, series) in curves.chain(shades).filter(|(name, _)| !name.is_empty()) {
-        let name = shorten(&clean(name), 48);
+        let name = fit(&clean(name), WIDTH - 60.0);
         let width = SWATCH + 6.0 + width_of(&name) + 14.0;
         if x > 6.0 && x + width > WIDTH {
             (x, y) = (6.0, y + LEGEND_ROW);
@@ -401,7 +406,7 @@ fn merged(intervals: impl Iterator<Item = [f64; 2]>) -> Vec<[f64; 2]> {
 }
 
 fn axis_label(label: &str, axis: &Axis) -> String {
-    let label = shorten(&clean(label), 56);
+    let label = fit(&clean(label), WIDTH - 80.0);
     if axis.exponent == 0 {
         label
     } else {
@@ -414,12 +419,28 @@ fn width_of(text: &str) -> f64 {
     text.chars()
         .map(|c| match c {
             'i' | 'l' | 'j' | 't' | 'f' | 'r' | '.' | ',' | '[' | ']' | '(' | ')' | ' ' => 4.4,
-            'm' | 'w' | 'M' | 'W' => 10.6,
-            c if c.is_uppercase() => 8.6,
+            'm' | 'w' | 'M' | 'W' | '<' | '>' | '=' | '+' | '±' | '&' => 11.4,
+            c if c.is_uppercase() => 8.8,
             c if (c as u32) > 0x2E80 => 13.0,
-            _ => 7.3,
+            _ => 7.7,
         })
         .sum()
+}
+
+/// As much of a text as fits into `width`, with an ellipsis where something was cut.
+fn fit(text: &str, width: f64) -> String {
+    if width_of(text) <= width {
+        return text.to_owned();
+    }
+    let mut left = width - width_of("…");
+    let kept: String = text
+        .chars()
+        .take_while(|c| {
+            left -= width_of(c.encode_utf8(&mut [0; 4]));
+            left >= 0.0
+        })
+        .collect();
+    kept + "…"
 }
 
 fn tenths(value: f64) -> i64 {

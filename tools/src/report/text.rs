@@ -10,22 +10,22 @@ pub fn clean(text: &str) -> String {
         .collect()
 }
 
-/// At most `longest` characters; the last one kept is an ellipsis when something was cut.
-pub fn shorten(text: &str, longest: usize) -> String {
-    if text.chars().count() <= longest {
-        return text.to_owned();
-    }
-    let kept: String = text.chars().take(longest.saturating_sub(1)).collect();
-    kept + "…"
-}
-
 /// `name (unit)`, or the name alone where there is no unit.
 pub fn with_unit(name: &str, unit: Option<&str>) -> String {
     unit.map_or_else(|| name.to_owned(), |unit| format!("{name} ({unit})"))
 }
 
-/// Four significant digits, a real minus sign, and a dash for what is no number.
+/// At most four significant digits, a real minus sign, and a dash for what is no number.
 pub fn number(value: f64) -> String {
+    let digits = significant(value);
+    if digits.contains('·') {
+        return digits;
+    }
+    trim_zeros(&digits).to_owned()
+}
+
+/// Four significant digits, also where they are zeros: for columns of like numbers.
+pub fn significant(value: f64) -> String {
     if !value.is_finite() {
         return "–".into();
     }
@@ -34,7 +34,7 @@ pub fn number(value: f64) -> String {
         "0".into()
     } else if (1e-3..1e6).contains(&magnitude) {
         let digits = (3 - magnitude.log10().floor() as i32).max(0) as usize;
-        trim_zeros(&format!("{value:.digits$}")).to_owned()
+        format!("{value:.digits$}")
     } else {
         let power = magnitude.log10().floor() as i32;
         let mantissa = value / 10f64.powi(power);
@@ -43,7 +43,7 @@ pub fn number(value: f64) -> String {
     plain.replace('-', "−")
 }
 
-/// A number in a column of like numbers: four significant digits, trailing zeros kept.
+/// A number with so many decimals.
 pub fn aligned(value: f64, decimals: usize) -> String {
     if !value.is_finite() {
         return "–".into();

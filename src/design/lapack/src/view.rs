@@ -28,6 +28,15 @@ fn span(rows: usize, columns: usize, lead: usize) -> usize {
     }
 }
 
+/// Row and column strides; an empty matrix gets strides that nalgebra accepts without any data.
+fn strides(rows: usize, columns: usize, lead: usize) -> (Dyn, Dyn) {
+    match (rows, columns) {
+        (0, _) => (Dyn(1), Dyn(0)),
+        (_, 0) => (Dyn(0), Dyn(1)),
+        _ => (Dyn(1), Dyn(lead)),
+    }
+}
+
 /// A read-only view of a column-major matrix.
 ///
 /// # Safety
@@ -44,7 +53,8 @@ pub(crate) unsafe fn matrix<'a>(
         0 => &[],
         _ => unsafe { std::slice::from_raw_parts(data, length) },
     };
-    DMatrixView::from_slice_with_strides_generic(slice, Dyn(rows), Dyn(columns), Dyn(1), Dyn(lead))
+    let (down, across) = strides(rows, columns, lead);
+    DMatrixView::from_slice_with_strides_generic(slice, Dyn(rows), Dyn(columns), down, across)
 }
 
 /// A writable view of a column-major matrix.
@@ -62,13 +72,8 @@ pub(crate) unsafe fn matrix_mut<'a>(
         0 => &mut [],
         _ => unsafe { std::slice::from_raw_parts_mut(data, length) },
     };
-    DMatrixViewMut::from_slice_with_strides_generic(
-        slice,
-        Dyn(rows),
-        Dyn(columns),
-        Dyn(1),
-        Dyn(lead),
-    )
+    let (down, across) = strides(rows, columns, lead);
+    DMatrixViewMut::from_slice_with_strides_generic(slice, Dyn(rows), Dyn(columns), down, across)
 }
 
 /// Which triangle of a symmetric matrix is stored.

@@ -12,7 +12,6 @@ use anyhow::{Context, Result};
 use events::Alarms;
 use figures::Scene;
 use ftc::design::{Design, Signal};
-use ftc::simulate::closed_loop::Merits;
 use ftc::simulate::{Trajectory, Variant};
 use std::io::Write as _;
 use std::path::Path;
@@ -56,6 +55,15 @@ fn replace(folder: &Path, path: &Path, content: &str) -> Result<()> {
     attempt().with_context(|| format!("cannot write {}", path.display()))
 }
 
+/// Every variant, the one the page is about first.
+const RANKING: [Variant; 5] = [
+    Variant::Ftc,
+    Variant::ToldTheFault,
+    Variant::Predictive,
+    Variant::Additive,
+    Variant::NoFtc,
+];
+
 /// What a variant is called everywhere on the page.
 fn variant_name(variant: Variant) -> &'static str {
     match variant {
@@ -91,10 +99,12 @@ pub(super) fn page(design: &Design, trajectories: &[Trajectory]) -> Page {
             .paragraph(
                 "What the plant really does (the true output, which no sensor of the faulty loop shows) with and \
                  without fault-tolerant control (FTC), beside a controller that is told the true fault: no estimator \
-                 can do better. Thin grey is what the sensor says. Shaded: the fault of this sensor is present.",
+                 can do better. Thin grey is what the sensor says in the loop with FTC. Shaded: the fault of this sensor is present.",
             )
             .figures(scene.outputs()),
-        Section::new("Figures of merit").with(Block::Table(tables::merits(design, trajectories))),
+        Section::new("Figures of merit")
+            .with(Block::Table(tables::merits(design, trajectories)))
+            .with(Block::Table(tables::variants(trajectories))),
     ];
     let faults = scene.faults();
     if !faults.is_empty() {
@@ -167,40 +177,73 @@ fn lead(design: &Design, trajectories: &[Trajectory]) -> String {
     ));
     if let Some((without, against_told)) = ratios(design, trajectories) {
         sentences.push(format!(
-            "Without fault-tolerant control the mean square error of the true outputs was {} as large as with it; \
-             a controller told the true fault would have reached {} of the error with it.",
-            times(without),
-            percent(1.0 / against_told)
+            "With fault-tolerant control (FTC) the mean square error of the true outputs behind these sensors was {}, and \
+             {} a controller that was told the true fault.",
+            beside_without(without),
+            beside_told(against_told)
         ));
     }
     sentences.join(" ")
 }
 
 /// Smallest `MSE without FTC / MSE with FTC` and largest `MSE with FTC / MSE told the fault` over
-/// the tracked outputs (true signals).
+/// the tracked outputs whose own sensor fails (over all tracked ones if none of these does), true signals.
 fn ratios(design: &Design, trajectories: &[Trajectory]) -> Option<(f64, f64)> {
     let tracked = &design.controller.feedback.tracked;
-    let merits = |variant| find(trajectories, variant).map(|run| run.merits(tracked));
-    let ftc = merits(Variant::Ftc)?;
-    let over = |above: &[Merits], below: &[Merits], pick: fn(f64, f64) -> f64| {
+    let ftc = find(trajectories, Variant::Ftc)?;
+    let mut outputs: Vec<usize> = (0..tracked.len())
+        .filter(|index| !events::fault_intervals(ftc, tracked[*index]).is_empty())
+        .collect();
+    if outputs.is_empty() {
+        outputs = (0..tracked.len()).collect();
+    }
+    let errors = |variant| -> Option<Vec<f64>> {
+        let merits = find(trajectories, variant)?.merits(tracked);
+        Some(
+            outputs
+                .iter()
+                .map(|index| merits[*index].truth.mse)
+                .collect(),
+        )
+    };
+    let over = |above: &[f64], below: &[f64], pick: fn(f64, f64) -> f64| {
         above
             .iter()
             .zip(below)
-            .map(|(a, b)| a.truth.mse / b.truth.mse)
+            .map(|(a, b)| a / b)
             .reduce(pick)
             .filter(|ratio| ratio.is_finite())
     };
-    let without = over(&merits(Variant::NoFtc)?, &ftc, f64::min)?;
-    let against_told = over(&ftc, &merits(Variant::ToldTheFault)?, f64::max)?;
+    let with = errors(Variant::Ftc)?;
+    let without = over(&errors(Variant::NoFtc)?, &with, f64::min)?;
+    let against_told = over(&with, &errors(Variant::ToldTheFault)?, f64::max)?;
     Some((without, against_told))
 }
 
-fn times(ratio: f64) -> String {
-    format!("{} times", rounded(ratio))
+/// How much smaller an error is than without FTC, as the middle of a sentence.
+fn beside_without(ratio: f64) -> String {
+    if ratio > 1.1 {
+        format!("at least {} times smaller than without it", rounded(ratio))
+    } else if ratio > 1.0 / 1.1 {
+        "about the same as without it for at least one of them".into()
+    } else {
+        format!(
+            "up to {} times larger than without it",
+            rounded(1.0 / ratio)
+        )
+    }
 }
 
-fn percent(ratio: f64) -> String {
-    format!("{} %", rounded(100.0 * ratio))
+/// How an error compares with that of a controller told the fault, as the middle of a sentence.
+fn beside_told(ratio: f64) -> String {
+    let difference = 100.0 * (ratio - 1.0);
+    if difference <= 0.0 {
+        "no larger than that of".into()
+    } else if difference < 10.0 {
+        format!("at most {} % larger than that of", rounded(difference))
+    } else {
+        format!("up to {} times that of", rounded(ratio))
+    }
 }
 
 /// Three significant digits.
@@ -228,11 +271,11 @@ fn key_numbers(design: &Design, trajectories: &[Trajectory]) -> Vec<KeyNumber> {
     if let Some((without, against_told)) = ratios(design, trajectories) {
         keys.push(key(
             format!("{} ×", rounded(without)),
-            "smaller true mean square error than without FTC, for the output that gains least",
+            "as large a true mean square error without FTC, at least",
         ));
         keys.push(key(
             format!("{} ×", text::aligned(against_told, 3)),
-            "the true mean square error of a controller told the fault, for the output farthest from it",
+            "the true mean square error of a controller told the fault, at most",
         ));
     }
     if let Some(run) = find(trajectories, Variant::Ftc) {
@@ -246,7 +289,7 @@ fn key_numbers(design: &Design, trajectories: &[Trajectory]) -> Vec<KeyNumber> {
         if let Some(delay) = alarms.longest_delay {
             keys.push(key(
                 count(delay as usize, "sample"),
-                "from the onset of a fault to its detection, at most",
+                "longest delay from a fault to its detection",
             ));
         }
         keys.push(key(
