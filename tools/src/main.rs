@@ -6,6 +6,7 @@
 //!                                                           └─> simulate (trajectories, metrics)
 //! ```
 
+mod archive;
 mod assemble;
 mod design_file;
 mod export;
@@ -15,6 +16,7 @@ mod progress;
 #[allow(dead_code)]
 mod report;
 mod simulate;
+mod ssp;
 mod summary;
 
 use clap::{Parser, Subcommand};
@@ -71,6 +73,9 @@ enum Command {
         /// Directory to write to; made if it does not exist.
         #[arg(long, value_name = "DIR")]
         out: PathBuf,
+        /// Also write NAME.ssp: both FMUs and their connections in one file (SSP 1.0).
+        #[arg(long)]
+        ssp: bool,
     },
     /// Run the design's scenario without any FMU: trajectories.csv, metrics.json, report.html and figures.
     ///
@@ -118,10 +123,10 @@ fn run(arguments: &Arguments) -> Result<String, Failure> {
             Ok(design) => Ok(summary::json(&design)),
             Err(failure) => Err(failure.explained_in_json()),
         },
-        Command::Export { design, out } => {
+        Command::Export { design, out, ssp } => {
             let staging = output::Staging::new(out).map_err(Failure::Input)?;
             let design = solve(design, &progress)?;
-            export::write(&design, staging).map_err(Failure::Input)
+            export::write(&design, staging, *ssp).map_err(Failure::Input)
         }
         Command::Simulate { design, out } => {
             let staging = output::Staging::new(out).map_err(Failure::Input)?;
