@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
     from conftest import Case
 
-EXAMPLES = ["paper"]
+EXAMPLES = ["paper", "paper_output", "tank"]
 
 
 @pytest.mark.parametrize("example", EXAMPLES)

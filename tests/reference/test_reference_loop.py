@@ -84,6 +84,7 @@ def test_every_branch_of_the_on_line_path(make_case: Callable[[dict], Case], des
     assert_agreement(make_case(design))
 
 
-def test_shipped_example(example_case: Callable[[str], Case]) -> None:
-    """The example a user copies."""
-    assert_agreement(example_case("paper"))
+@pytest.mark.parametrize("example", ["paper", "paper_output", "tank"])
+def test_shipped_example(example_case: Callable[[str], Case], example: str) -> None:
+    """The examples a user copies."""
+    assert_agreement(example_case(example))
