@@ -78,9 +78,19 @@ def test_scenario_a(make_case: Callable[[dict], Case], disturbed: str, reference
     assert_agreement(make_case(design_file.scenario_a(disturbed=disturbed, reference=reference, noise=noise)))
 
 
-@pytest.mark.parametrize("design", [harsh(), displaced()], ids=lambda design: design["name"])
+def bumpless() -> dict:
+    """Returns a design whose command does not jump at a mode switch."""
+    design = design_file.scenario_a(disturbed="state", reference="sine", noise=0.001)
+    design["name"] = "bumpless"
+    design["controller"] |= {"bumpless": True}
+    return design
+
+
+@pytest.mark.parametrize(
+    "design", [harsh(), displaced(), bumpless(), design_file.delayed()], ids=lambda design: design["name"]
+)
 def test_every_branch_of_the_on_line_path(make_case: Callable[[dict], Case], design: dict) -> None:
-    """Saturation, lost and stuck sensors, harmonics, operating points, sizes that all differ."""
+    """Saturation, lost and stuck sensors, harmonics, operating points, unequal sizes, bumpless switching, latency."""
     assert_agreement(make_case(design))
 
 
