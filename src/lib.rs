@@ -9,3 +9,4 @@ pub mod design;
 pub mod plant;
 pub mod rows;
 pub mod simulate;
+pub mod state;

@@ -37,13 +37,19 @@ pub fn is_measurement(value: f64) -> bool {
 }
 
 /// The printed additive control of all modes.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, PartialEq, Serialize, Deserialize)]
 pub struct AdditiveControl {
     /// `f_int`: integral of the negative fault estimate on the tracked outputs (r).
     integral: Vec<f64>,
     /// `u_adc` (m).
     control: Vec<f64>,
 }
+
+crate::state::state!(AdditiveControl {
+    parts: [integral, control],
+    constants: [],
+    counters: []
+});
 
 impl AdditiveControl {
     /// Nothing to compensate yet.

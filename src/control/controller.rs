@@ -1,5 +1,7 @@
 //! The controller: estimator, compensation, observer, state feedback and integrator, composed.
 
+mod derivative;
+
 use super::compensation::{self, AdditiveControl};
 use super::estimator::{EstimatorState, Observation};
 use super::integrator;
@@ -7,6 +9,7 @@ use super::kernel;
 use super::observer::{ObservedMode, ObserverState};
 use super::parameters::{Compensation, ControllerParameters, FeedbackGains, Limits};
 use crate::plant::OperatingPoint;
+use crate::state::State;
 use nalgebra::DMatrix;
 use serde::{Deserialize, Serialize};
 
@@ -50,7 +53,7 @@ pub enum Compensate<'a> {
 }
 
 /// Everything that changes while the controller runs. A copy of it is a complete snapshot.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, PartialEq, Serialize, Deserialize)]
 pub struct ControllerState {
     /// Mode of the last tick; none before the first.
     mode: Option<usize>,
@@ -77,6 +80,15 @@ pub struct ControllerState {
     /// A fault of zero (p).
     no_fault: Vec<f64>,
 }
+
+crate::state::state!(ControllerState {
+    parts: [
+        observer, estimator, integral, additive, command, corrected, acting, deviation, excess,
+        substitute, no_fault
+    ],
+    constants: [],
+    counters: [mode]
+});
 
 impl Controller {
     /// Prepares a controller; the parameters' sizes must agree with the plant's.
@@ -175,6 +187,11 @@ impl Controller {
         }
         self.command(state, mode, point, sample.compensate);
         self.advance(state, model, mode, sample);
+    }
+
+    /// Whether a state has the sizes of this controller; one that came as bytes may not.
+    pub fn fits(&self, state: &ControllerState) -> bool {
+        state.same_shape(&self.initial_state(0))
     }
 
     /// Notes the mode and returns the one just left.

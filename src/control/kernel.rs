@@ -26,6 +26,11 @@ pub fn bound(values: &mut [f64]) {
     }
 }
 
+/// The change of a bounded `value` that would change by `change`: none at a bound.
+pub fn bounded_change(value: f64, change: f64) -> f64 {
+    if value.abs() < LARGEST { change } else { 0.0 }
+}
+
 /// `out += matrix * vector`.
 pub fn add_product(out: &mut [f64], matrix: &DMatrix<f64>, vector: &[f64]) {
     let rows = matrix.nrows().max(1);

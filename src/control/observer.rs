@@ -17,7 +17,7 @@ use nalgebra::DMatrix;
 use serde::{Deserialize, Serialize};
 
 /// What the observer carries from one tick to the next.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, PartialEq, Serialize, Deserialize)]
 pub struct ObserverState {
     /// Prediction of the state before the measurement (n).
     prior: Vec<f64>,
@@ -28,6 +28,12 @@ pub struct ObserverState {
     /// Output-sized scratch (p).
     innovation: Vec<f64>,
 }
+
+crate::state::state!(ObserverState {
+    parts: [prior, injection, estimate, innovation],
+    constants: [],
+    counters: []
+});
 
 /// One mode of the plant as the observer uses it: affine in physical units.
 #[derive(Clone, Debug)]
@@ -82,6 +88,18 @@ impl ObserverState {
             kernel::add_product(&mut self.estimate, &gain.0, &self.innovation);
         }
         kernel::bound(&mut self.estimate);
+    }
+
+    /// Right after [`correct`](Self::correct): the estimate becomes its change for a small change
+    /// `dy` (p) of the measurement, `H dy`. Spoils the injection.
+    pub fn differentiate(&mut self, observer: &Observer, from: usize, to: usize, dy: &[f64]) {
+        self.injection.fill(0.0);
+        if let Some(gain) = observer.decoupling.get(from).and_then(|row| row.get(to)) {
+            kernel::add_product(&mut self.injection, &gain.0, dy);
+        }
+        for (estimate, &change) in self.estimate.iter_mut().zip(&self.injection) {
+            *estimate = kernel::bounded_change(*estimate, change);
+        }
     }
 
     /// Predicts the next state under the acting input `u`, and keeps the injection of measurement `y`.

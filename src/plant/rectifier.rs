@@ -56,6 +56,29 @@ impl Rectifier {
         [rate_d, rate_q, rate_v]
     }
 
+    /// The change of [`derivative`](Self::derivative) at `(x, u)` under a small change
+    /// `(dx, du, dw)`; it is the same for every `w`.
+    pub fn differential(
+        &self,
+        mode: usize,
+        (x, u): (&RectifierState, [f64; 2]),
+        (dx, du, dw): (&RectifierState, [f64; 2], f64),
+    ) -> RectifierState {
+        let ([i_d, i_q, v], [di_d, di_q, dv]) = (*x, *dx);
+        let rate = |u: f64, i: f64| (u - i) / self.current_loop;
+        let (rate_d, rate_q) = (rate(u[0], i_d), rate(u[1], i_q));
+        let (change_d, change_q) = (rate(du[0], di_d), rate(du[1], di_q));
+        let drawn =
+            1.5 * (self.phase_voltage * di_d - 2.0 * self.resistance * (i_d * di_d + i_q * di_q));
+        let into_coils = 1.5
+            * self.inductance
+            * (di_d * rate_d + i_d * change_d + di_q * rate_q + i_q * change_q);
+        let stored = self.drawn_power(x) - 1.5 * self.inductance * (i_d * rate_d + i_q * rate_q);
+        let load = self.loads.get(mode).copied().unwrap_or(f64::INFINITY);
+        let change_v = (drawn - into_coils) / v - stored * dv / (v * v) - dv / load - dw;
+        [change_d, change_q, change_v / self.capacitance]
+    }
+
     /// Power taken from the grid less the loss in the line, in W.
     pub fn drawn_power(&self, x: &RectifierState) -> f64 {
         let [i_d, i_q, _] = *x;

@@ -1,10 +1,15 @@
 //! The plant under a scenario, sample by sample: what the plant FMU runs.
 
+mod derivative;
+
+pub use derivative::Change;
+
 use super::noise;
 use super::scenario::Scenario;
 use super::truth::{self, Truth};
 use crate::control::kernel;
 use crate::plant::SwitchedPlant;
+use crate::state::State;
 use serde::{Deserialize, Serialize};
 
 /// A plant and its scenario: immutable, shared by any number of [`PlantState`]s.
@@ -33,7 +38,7 @@ pub struct External<'a> {
 }
 
 /// The plant at one tick, with every signal an outside observer may see.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, PartialEq, Serialize, Deserialize)]
 pub struct PlantState {
     /// Tick this state belongs to.
     pub tick: u64,
@@ -58,6 +63,22 @@ pub struct PlantState {
     /// Scratch (n).
     next: Vec<f64>,
 }
+
+crate::state::state!(PlantState {
+    parts: [
+        x,
+        y,
+        y_true,
+        fault,
+        disturbance,
+        reference,
+        noise,
+        last,
+        next
+    ],
+    constants: [],
+    counters: [tick, mode]
+});
 
 impl PlantSimulator {
     /// Prepares a plant that is what it was designed for; see [`with_truth`](Self::with_truth).
@@ -122,16 +143,18 @@ impl PlantSimulator {
         }
     }
 
+    /// Whether a state has the sizes of this plant; one that came as bytes may not.
+    pub fn fits(&self, state: &PlantState) -> bool {
+        state.mode < self.plant.modes.len() && state.same_shape(&self.initial_state())
+    }
+
     /// Makes every output of the present tick from the present state.
     pub fn observe(&self, state: &mut PlantState, external: &External<'_>) {
         let te = self.plant.sample_time;
         let tick = state.tick;
         let scenario = &self.scenario;
         let built_in = external.mode.is_none();
-        state.mode = external
-            .mode
-            .unwrap_or_else(|| scenario.mode(tick, te))
-            .min(self.plant.modes.len() - 1);
+        state.mode = self.active_mode(external, tick);
         let value =
             |signal: &super::scenario::Waveform| if built_in { signal.at(tick, te) } else { 0.0 };
         for (out, signal) in state.reference.iter_mut().zip(&scenario.reference) {
@@ -165,6 +188,14 @@ impl PlantSimulator {
         self.read_sensors(state, built_in);
     }
 
+    /// The mode (0-based) at `tick`: the scenario's, unless another is given.
+    fn active_mode(&self, external: &External<'_>, tick: u64) -> usize {
+        external
+            .mode
+            .unwrap_or_else(|| self.scenario.mode(tick, self.plant.sample_time))
+            .min(self.plant.modes.len() - 1)
+    }
+
     /// Moves to the next tick under input `u` (m), held over the sample.
     pub fn advance(&self, state: &mut PlantState, u: &[f64]) {
         match &self.truth {
@@ -179,7 +210,7 @@ impl PlantSimulator {
             Truth::AsDesigned | Truth::Linear { .. } => self.advance_linear(state, u),
         }
         kernel::bound(&mut state.x);
-        state.tick += 1;
+        state.tick = state.tick.saturating_add(1);
     }
 
     fn advance_linear(&self, state: &mut PlantState, u: &[f64]) {

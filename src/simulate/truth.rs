@@ -56,3 +56,36 @@ pub(super) fn advance_rectifier(
     });
     x.copy_from_slice(&state);
 }
+
+/// A signal held over a sample, and its change.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Held<'a> {
+    /// Input `u` (m) and `du`.
+    pub input: [&'a [f64]; 2],
+    /// Disturbance `w` (s) and `dw`.
+    pub disturbance: [&'a [f64]; 2],
+}
+
+/// The change of the rectifier's state after one sample from `x`, by its variational equation
+/// `d(dx)/dt = J(x, u, w) (dx, du, dw)`, integrated together with the state.
+pub(super) fn differentiate_rectifier(
+    rectifier: &Rectifier,
+    mode: usize,
+    x: &[f64],
+    held: &Held<'_>,
+    sample_time: f64,
+    change: &mut [f64],
+) {
+    let (&[i_d, i_q, v], [&[u_d, u_q], &[du_d, du_q]]) = (x, held.input) else {
+        return;
+    };
+    let [w, dw] = held.disturbance.map(|w| w.first().copied().unwrap_or(0.0));
+    let mut both = [i_d, i_q, v, 0.0, 0.0, 0.0];
+    integrate::advance(&mut both, sample_time, ACCURACY, |z| {
+        let (x, dx) = ([z[0], z[1], z[2]], [z[3], z[4], z[5]]);
+        let rate = rectifier.derivative(mode, &x, [u_d, u_q], w);
+        let change = rectifier.differential(mode, (&x, [u_d, u_q]), (&dx, [du_d, du_q], dw));
+        [rate[0], rate[1], rate[2], change[0], change[1], change[2]]
+    });
+    change.copy_from_slice(&both[3..]);
+}

@@ -178,7 +178,7 @@ fn describe(
         license: env!("CARGO_PKG_LICENSE"),
         step_size: design.controller.plant.sample_time,
         stop_time: interface.stop_time,
-        directional_derivative: false,
+        directional_derivative: true,
         table: &table,
     })
     .map_err(|what| format!("{identifier}: {what}"))

@@ -4,6 +4,7 @@
 //! controller does it. Two magic references make it fail, so that failure can be tested:
 //! [`PANIC`] and [`FAIL`].
 
+use fmu_abi::clock::Event;
 use fmu_abi::{Refusal, Slave, Values, require_finite, resource, selected_mode};
 use model_description::{Causality, Kind, Role, Span, Variability, Variable, VariableTable};
 use serde::{Deserialize, Serialize};
@@ -213,8 +214,9 @@ impl Slave for Staircase {
 
     fn directional_derivative(
         &self,
-        _state: &State,
+        _trial: &mut State,
         values: &Values,
+        _at: Option<Event>,
         seed: &Values,
         response: &mut Values,
     ) -> Result<(), Refusal> {

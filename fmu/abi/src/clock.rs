@@ -164,6 +164,35 @@ impl Clock {
         }
     }
 
+    /// The event that comes next, however far it is.
+    pub fn upcoming(&self) -> Event {
+        if self.begun == self.ended {
+            Event::Begin(self.begun)
+        } else {
+            Event::End(self.ended)
+        }
+    }
+
+    /// Whether all that has come by now has happened, as between two steps.
+    pub fn is_at_rest(&self) -> bool {
+        self.clone().next_event().is_none()
+    }
+
+    /// Whether this is a clock with ticks of `sample_time` seconds; one that came as bytes may
+    /// be anything.
+    pub fn is_sound(&self, sample_time: f64) -> bool {
+        const MOST: u64 = 1 << 60;
+        let known = [self.now, self.wanted].iter().all(|time| time.is_finite());
+        let counts = [self.ticks, self.begun, self.ended, self.steps];
+        self.sample_time == sample_time
+            && known
+            && self.remainder.abs() <= 0.5
+            && counts.iter().all(|&count| count < MOST)
+            && self.ended <= self.begun
+            && self.begun <= self.ended + 1
+            && self.begun <= self.ticks + 1
+    }
+
     /// Adds `length` ticks, and drops what rounding explains.
     fn move_on(&mut self, length: f64, resolution: f64) {
         let sum = self.remainder + length;

@@ -105,6 +105,7 @@ pub struct Component<S: Slave> {
     /// States saved for the importer, by their address, which is its handle.
     saved: BTreeMap<usize, Box<Snapshot<S::State>>>,
     /// Scratch of directional derivatives.
+    trial: S::State,
     seed: Values,
     response: Values,
 }
@@ -127,6 +128,7 @@ impl<S: Slave> Component<S> {
                 .collect(),
             current: Snapshot::fresh(&slave),
             saved: BTreeMap::new(),
+            trial: slave.initial_state(),
             seed: start.clone(),
             response: start,
             slave,
@@ -315,8 +317,17 @@ impl<S: Slave> Component<S> {
             }
         }
         let Snapshot { state, values, .. } = &self.current;
-        self.slave
-            .directional_derivative(state, values, &self.seed, &mut self.response)?;
+        if self.current.phase != State::InitializationMode {
+            self.slave.check_inputs(values)?;
+        }
+        self.trial.clone_from(state);
+        self.slave.directional_derivative(
+            &mut self.trial,
+            values,
+            self.current.upcoming(),
+            &self.seed,
+            &mut self.response,
+        )?;
         for (&reference, slot) in unknowns.iter().zip(out) {
             *slot = self.response.at(reference).unwrap_or_default();
         }
@@ -328,15 +339,15 @@ impl<S: Slave> Component<S> {
         if handle == 0 {
             return Ok(self.keep(self.current.clone()));
         }
-        let current = self.current.clone();
         let saved = self.saved.get_mut(&handle).ok_or_else(unknown_state)?;
-        **saved = current;
+        saved.as_mut().clone_from(&self.current);
         Ok(handle)
     }
 
     /// fmi2SetFMUstate.
     pub fn restore(&mut self, handle: usize) -> Outcome {
-        self.current = self.saved(handle)?.clone();
+        let saved = self.saved.get(&handle).ok_or_else(unknown_state)?;
+        self.current.clone_from(saved);
         Ok(())
     }
 

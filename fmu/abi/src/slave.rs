@@ -9,6 +9,7 @@
 //! saving, restoring, resetting and serialising a matter of cloning a value.
 
 use crate::Values;
+use crate::clock::Event;
 use model_description::{Span, VariableTable};
 use serde::{Serialize, de::DeserializeOwned};
 use std::path::Path;
@@ -95,15 +96,19 @@ pub trait Slave: Sized + 'static {
     /// Whether [`Slave::directional_derivative`] is available.
     const PROVIDES_DIRECTIONAL_DERIVATIVE: bool = false;
 
-    /// The response of the outputs to a change of the inputs, at the present state.
+    /// The response of the outputs to a change of the inputs.
     ///
-    /// `seed` and `response` have an element for each variable: `seed` holds the changes of the
-    /// known variables and zero elsewhere; `response`, zero on entry, receives the changes of
-    /// the outputs that the next tick would publish.
+    /// `at` is the tick whose [`Slave::begin_tick`] or [`Slave::end_tick`] comes next, or none
+    /// in initialization mode. `seed` and `response` have an element for each variable: `seed`
+    /// holds the changes of the known variables and zero elsewhere; `response`, zero on entry,
+    /// receives the changes of what the outputs will be after that event, or are after
+    /// [`Slave::initialize`]. `trial` is a copy of the present state to be tried with; what
+    /// is left in it does not matter.
     fn directional_derivative(
         &self,
-        _state: &Self::State,
+        _trial: &mut Self::State,
         _values: &Values,
+        _at: Option<Event>,
         _seed: &Values,
         _response: &mut Values,
     ) -> Result<(), Refusal> {
@@ -112,11 +117,9 @@ pub trait Slave: Sized + 'static {
 
     /// Whether a deserialised state has the sizes of this model.
     ///
-    /// Its bytes carry a checksum and this model's fingerprint, so a mismatch takes malice;
-    /// a slave that indexes by stored sizes checks them here.
-    fn fits(&self, _state: &Self::State) -> bool {
-        true
-    }
+    /// Its bytes carry a checksum and this model's fingerprint, so a mismatch takes malice.
+    /// On line, sizes are not looked at again, so every slave compares them here.
+    fn fits(&self, state: &Self::State) -> bool;
 }
 
 /// The active mode, counted from 0, from its Integer variable and its Real twin.

@@ -1,6 +1,6 @@
 //! Everything that changes at run time, as one value.
 
-use crate::clock::Clock;
+use crate::clock::{Clock, Event};
 use crate::life_cycle::State;
 use crate::{Slave, Values};
 use serde::{Deserialize, Serialize, de::DeserializeOwned};
@@ -14,7 +14,7 @@ const CHECKSUM: usize = size_of::<u32>();
 /// Life cycle, time, values and the slave's state: what fmi2GetFMUstate saves.
 ///
 /// The logger's switches are not part of it, and neither is the model.
-#[derive(Clone, Debug, Serialize, Deserialize)]
+#[derive(Debug, Serialize, Deserialize)]
 pub struct Snapshot<T> {
     /// Where in the life cycle.
     pub phase: State,
@@ -30,7 +30,32 @@ pub struct Snapshot<T> {
     pub state: T,
 }
 
+impl<T: Clone> Clone for Snapshot<T> {
+    fn clone(&self) -> Self {
+        Self {
+            clock: self.clock.clone(),
+            values: self.values.clone(),
+            state: self.state.clone(),
+            ..*self
+        }
+    }
+
+    /// Copies in place: nothing is allocated if `state` does not.
+    fn clone_from(&mut self, source: &Self) {
+        (self.phase, self.set_up, self.stale) = (source.phase, source.set_up, source.stale);
+        self.clock.clone_from(&source.clock);
+        self.values.clone_from(&source.values);
+        self.state.clone_from(&source.state);
+    }
+}
+
 impl<T> Snapshot<T> {
+    /// What comes next in time; none before the first step can be made.
+    pub fn upcoming(&self) -> Option<Event> {
+        let before = matches!(self.phase, State::Instantiated | State::InitializationMode);
+        (!before).then(|| self.clock.upcoming())
+    }
+
     /// The state after fmi2Instantiate and after fmi2Reset.
     pub fn fresh<S: Slave<State = T>>(slave: &S) -> Self {
         Self {
@@ -77,11 +102,14 @@ impl<T> Snapshot<T> {
         if of != guid {
             return Err(format!("the bytes belong to the FMU with guid {of}"));
         }
-        let fits = snapshot.values.len() == slave.variables().len() && slave.fits(&snapshot.state);
+        let fits = snapshot.values.len() == slave.variables().len()
+            && snapshot.clock.is_sound(slave.sample_time())
+            && (snapshot.clock.is_at_rest() || snapshot.phase == State::Error)
+            && slave.fits(&snapshot.state);
         if fits && rest.is_empty() {
             Ok(snapshot)
         } else {
-            Err("the bytes hold a state of other sizes".into())
+            Err("the bytes hold no state that this FMU can be in".into())
         }
     }
 }

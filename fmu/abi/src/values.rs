@@ -7,8 +7,19 @@ use serde::{Deserialize, Serialize};
 ///
 /// The slave reads inputs and parameters and writes outputs, by [`Span`]. A span that does not
 /// fit reads as empty and is not written: nothing here can panic.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, PartialEq, Serialize, Deserialize)]
 pub struct Values(Box<[f64]>);
+
+impl Clone for Values {
+    fn clone(&self) -> Self {
+        Self(self.0.clone())
+    }
+
+    /// Copies in place.
+    fn clone_from(&mut self, source: &Self) {
+        self.0.clone_from(&source.0);
+    }
+}
 
 impl Values {
     /// The start values of a table.

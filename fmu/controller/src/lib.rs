@@ -4,6 +4,7 @@
 //! when a tick begins: it samples the measurements and publishes the command at once, so a master
 //! that steps the controller before the plant adds no delay to the loop.
 
+use fmu_abi::clock::Event;
 use fmu_abi::{Refusal, Slave, Values, require_finite, resource, selected_mode};
 use ftc::control::{Compensate, Controller, ControllerState, Sample};
 use ftc::design::Design;
@@ -64,6 +65,21 @@ impl ControllerFmu {
             self.spans.mode_real,
             modes,
         )
+    }
+
+    fn sample<'a>(&self, values: &'a Values, tick: u64) -> Result<Sample<'a>, Refusal> {
+        Ok(Sample {
+            tick,
+            mode: self.mode(values)?,
+            measurement: values.get(self.spans.measurement),
+            reference: values.get(self.spans.reference),
+            thresholds: values.get(self.spans.threshold),
+            compensate: if values.flag(self.spans.ftc_enabled) {
+                Compensate::Estimate
+            } else {
+                Compensate::Nothing
+            },
+        })
     }
 
     fn publish(&self, state: &ControllerState, values: &mut Values) {
@@ -131,20 +147,36 @@ impl Slave for ControllerFmu {
         values: &mut Values,
         k: u64,
     ) -> Result<(), Refusal> {
-        let sample = Sample {
-            tick: k,
-            mode: self.mode(values)?,
-            measurement: values.get(self.spans.measurement),
-            reference: values.get(self.spans.reference),
-            thresholds: values.get(self.spans.threshold),
-            compensate: if values.flag(self.spans.ftc_enabled) {
-                Compensate::Estimate
-            } else {
-                Compensate::Nothing
-            },
-        };
-        self.controller.tick(state, &sample);
+        self.controller.tick(state, &self.sample(values, k)?);
         self.publish(state, values);
         Ok(())
+    }
+
+    const PROVIDES_DIRECTIONAL_DERIVATIVE: bool = true;
+
+    /// Before the first tick no output depends on a Real input.
+    fn directional_derivative(
+        &self,
+        trial: &mut ControllerState,
+        values: &Values,
+        at: Option<Event>,
+        seed: &Values,
+        response: &mut Values,
+    ) -> Result<(), Refusal> {
+        // Within a tick, too, the outputs change when the next one begins.
+        let k = match at {
+            None => return Ok(()),
+            Some(Event::Begin(k)) => k,
+            Some(Event::End(k)) => k + 1,
+        };
+        let sample = self.sample(values, k)?;
+        let change = seed.get(self.spans.measurement);
+        self.controller.differentiate(trial, &sample, change);
+        self.publish(trial, response);
+        Ok(())
+    }
+
+    fn fits(&self, state: &ControllerState) -> bool {
+        self.controller.fits(state)
     }
 }

@@ -5,9 +5,10 @@
 //! With `scenario_enabled` it also plays the design's experiment: mode schedule, references,
 //! faults, disturbance and noise.
 
+use fmu_abi::clock::Event;
 use fmu_abi::{Refusal, Slave, Values, require_finite, resource, selected_mode};
 use ftc::design::Design;
-use ftc::simulate::plant::External;
+use ftc::simulate::plant::{Change, External};
 use ftc::simulate::{PlantSimulator, PlantState};
 use model_description::{Interface, PLANT, Role, Span, VariableTable};
 use std::path::Path;
@@ -171,5 +172,43 @@ impl Slave for PlantFmu {
         _k: u64,
     ) -> Result<(), Refusal> {
         self.publish(state, values)
+    }
+
+    const PROVIDES_DIRECTIONAL_DERIVATIVE: bool = true;
+
+    /// Once a tick has begun, the command comes too late for what is published at its end.
+    fn directional_derivative(
+        &self,
+        trial: &mut PlantState,
+        values: &Values,
+        at: Option<Event>,
+        seed: &Values,
+        response: &mut Values,
+    ) -> Result<(), Refusal> {
+        let spans = &self.spans;
+        let external = self.external(values)?;
+        let change = Change {
+            command: seed.get(spans.command),
+            fault: seed.get(spans.external_fault),
+            disturbance: seed.get(spans.external_disturbance),
+        };
+        if let Some(Event::Begin(_)) = at {
+            let command = values.get(spans.command);
+            self.simulator
+                .differentiate_tick(trial, &external, command, &change);
+        } else {
+            self.simulator
+                .differentiate_outputs(trial, &external, &change);
+        }
+        response.set(spans.measurement, &trial.y);
+        response.set(spans.true_output, &trial.y_true);
+        response.set(spans.state, &trial.x);
+        response.set(spans.fault, &trial.fault);
+        response.set(spans.disturbance, &trial.disturbance);
+        Ok(())
+    }
+
+    fn fits(&self, state: &PlantState) -> bool {
+        self.simulator.fits(state)
     }
 }

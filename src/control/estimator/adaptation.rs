@@ -24,7 +24,7 @@ const ADVANTAGE: f64 = 0.98;
 const BELIEVABLE: f64 = 0.5;
 
 /// The adapted response of one mode, with `q = m j` regressors.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, PartialEq, Serialize, Deserialize)]
 pub struct Adaptation {
     /// Adapted less database response (p x q, row after row).
     change: Vec<f64>,
@@ -39,6 +39,19 @@ pub struct Adaptation {
     /// And of the adapted one (p).
     adapted_error: Vec<f64>,
 }
+
+crate::state::state!(Adaptation {
+    parts: [
+        change,
+        covariance,
+        direction,
+        addition,
+        fixed_error,
+        adapted_error
+    ],
+    constants: [],
+    counters: []
+});
 
 impl Adaptation {
     /// Nothing learned beyond the database.

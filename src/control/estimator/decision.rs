@@ -32,6 +32,12 @@ pub struct Decision {
     contradictions: u32,
 }
 
+impl crate::state::State for Decision {
+    fn same_shape(&self, _: &Self) -> bool {
+        true
+    }
+}
+
 impl Decision {
     /// Whether a fault is declared.
     pub fn flagged(&self) -> bool {

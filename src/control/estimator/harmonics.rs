@@ -10,7 +10,7 @@ use crate::control::parameters::{Harmonics, PhasorMap};
 use serde::{Deserialize, Serialize};
 
 /// Learned coefficients of one mode, with `q = 2 x harmonics` regressors.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, PartialEq, Serialize, Deserialize)]
 pub struct HarmonicState {
     /// Coefficients per sensor (p x q, row after row).
     coefficients: Vec<f64>,
@@ -23,6 +23,12 @@ pub struct HarmonicState {
     /// Samples learned from.
     samples: u64,
 }
+
+crate::state::state!(HarmonicState {
+    parts: [coefficients, covariance, regressor, direction],
+    constants: [],
+    counters: [samples]
+});
 
 /// Samples per coefficient before a response counts as known.
 const SAMPLES_PER_COEFFICIENT: u64 = 4;

@@ -8,6 +8,7 @@
 
 mod adaptation;
 mod decision;
+mod derivative;
 mod harmonics;
 mod predictor;
 mod window;
@@ -44,11 +45,13 @@ pub struct Observation<'a> {
 }
 
 /// What the estimator remembers, and what it last said.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, PartialEq, Serialize, Deserialize)]
 pub struct EstimatorState {
     history: InputHistory,
     /// Ticks until the regressor again holds inputs of the present mode only.
     hold: usize,
+    /// Whether the last residual was judged.
+    judged: bool,
     /// Per mode: the learned response to the periodic disturbance.
     harmonics: Vec<HarmonicState>,
     /// Per mode: the adapted response; empty unless adaptation is on.
@@ -66,6 +69,22 @@ pub struct EstimatorState {
     pub flagged: Vec<bool>,
 }
 
+crate::state::state!(EstimatorState {
+    parts: [
+        history,
+        harmonics,
+        adaptations,
+        decisions,
+        window,
+        prediction,
+        residual,
+        fault,
+        flagged
+    ],
+    constants: [],
+    counters: [hold, judged]
+});
+
 impl EstimatorState {
     /// Nothing seen yet: `inputs` is the command that has acted so far (m).
     pub fn new(estimator: &Estimator, inputs: &[f64], outputs: usize) -> Self {
@@ -81,6 +100,7 @@ impl EstimatorState {
         Self {
             history: InputHistory::new(inputs, estimator.response_length),
             hold: estimator.response_length,
+            judged: false,
             harmonics,
             adaptations: if estimator.adapt {
                 estimator.predictors.iter().map(Adaptation::new).collect()
@@ -144,6 +164,7 @@ impl EstimatorState {
             EstimatorMethod::Sliding => self.slide(seen),
             EstimatorMethod::None => None,
         };
+        self.judged = widening.is_some();
         let healthy = self.decide(estimator, seen, widening);
         if healthy {
             self.learn(estimator, seen.mode);

@@ -6,7 +6,7 @@ use serde::{Deserialize, Serialize};
 
 /// The last `j` acting inputs, oldest first: the paper's `u_bar(k)` of (42) without `u(k)`,
 /// which cannot act on `y(k)` since the plant has no feed-through.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, PartialEq, Serialize, Deserialize)]
 pub struct InputHistory {
     /// Inputs in physical units (m j).
     inputs: Vec<f64>,
@@ -16,6 +16,12 @@ pub struct InputHistory {
     whitened: Vec<f64>,
     width: usize,
 }
+
+crate::state::state!(InputHistory {
+    parts: [inputs, regressor, whitened],
+    constants: [width],
+    counters: []
+});
 
 impl InputHistory {
     /// `inputs` (m) has acted for the last `length` samples.

@@ -15,7 +15,7 @@ use serde::{Deserialize, Serialize};
 const RANK_TOLERANCE: f64 = 1e-9;
 
 /// The last `L` regressors and outputs.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, PartialEq, Serialize, Deserialize)]
 pub struct SlidingWindow {
     /// `U` (q x L), row after row; column 0 is the oldest sample.
     inputs: Vec<f64>,
@@ -29,6 +29,12 @@ pub struct SlidingWindow {
     /// Samples taken so far, at most `L`.
     filled: usize,
 }
+
+crate::state::state!(SlidingWindow {
+    parts: [inputs, outputs, basis, projection],
+    constants: [length],
+    counters: [filled]
+});
 
 impl SlidingWindow {
     /// An empty window of `length` samples of a regressor of size `regressor` and `outputs` sensors.
@@ -65,6 +71,12 @@ impl SlidingWindow {
         for (value, row) in out.iter_mut().zip(self.outputs.chunks_exact(self.length)) {
             *value = kernel::bounded(kernel::dot(row, &self.projection));
         }
+    }
+
+    /// What the newest output weighs in the residual; nothing before the first sample.
+    pub fn newest_weight(&self) -> f64 {
+        let newest = self.projection.last().copied().unwrap_or(0.0);
+        if self.filled == 0 { 0.0 } else { newest }
     }
 
     /// Computes `Pi e_L` by pivoted Gram-Schmidt over the rows of `U`.

@@ -47,6 +47,7 @@ fn paper(noise: f64) -> Design {
         },
         controller,
         truth: Truth::default(),
+        synthesis: None,
         scenario: common::scenario(common::reference("levels"), noise, 1),
     }
 }
@@ -115,6 +116,7 @@ fn lags(outputs: usize, disturbances: usize, steps: u64) -> Design {
             plant,
         },
         truth: Truth::default(),
+        synthesis: None,
         scenario: Scenario {
             steps,
             noise: vec![0.02; outputs],

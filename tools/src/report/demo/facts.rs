@@ -42,6 +42,7 @@ pub fn facts(design: &Design) -> Vec<(String, String)> {
         ("Sample time", format!("{} s", number(te))),
         ("Tracked", crate::report::text::list(&tracked_names(design))),
         ("Latency", count(feedback.latency, "sample")),
+        ("Stability", stability(design)),
         ("Observer", observer(design)),
         ("Fault estimator", method(estimator.method).into()),
     ];
@@ -75,6 +76,21 @@ fn tracked_names(design: &Design) -> Vec<String> {
         .iter()
         .map(|&row| super::name_of(&design.signals.outputs, row, "y"))
         .collect()
+}
+
+/// What the certificate says about switching.
+fn stability(design: &Design) -> String {
+    match &design.synthesis {
+        None => "not certified: the gains were not made by synthesis".into(),
+        Some(synthesis) => match &synthesis.state_feedback.dwell {
+            None => "certified under arbitrary switching".into(),
+            Some(dwell) => format!(
+                "certified while modes last on average longer than {} samples ({} s)",
+                number(dwell.samples),
+                number(dwell.seconds)
+            ),
+        },
+    }
 }
 
 fn observer(design: &Design) -> String {

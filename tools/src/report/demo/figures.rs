@@ -1,7 +1,7 @@
 //! The figures of the page.
 
 use super::events::{any_fault_intervals, fault_intervals};
-use super::{find, name_of, unit_of, variant_name};
+use super::{RANKING, find, name_of, unit_of, variant_name};
 use crate::report::figure::{Dash, Figure, Ink, Mark, Point, Series, Weight};
 use crate::report::text::with_unit;
 use ftc::control::parameters::EstimatorMethod;
@@ -234,26 +234,21 @@ impl<'a> Scene<'a> {
 
     /// A signal of every variant, each in the variant's own look; the one this is about on top.
     fn variants(&self, signal: impl Fn(&Record) -> f64) -> Vec<Series> {
-        [
-            Variant::NoFtc,
-            Variant::Additive,
-            Variant::Predictive,
-            Variant::ToldTheFault,
-            Variant::Ftc,
-        ]
-        .into_iter()
-        .filter_map(|variant| find(self.trajectories, variant))
-        .map(|run| {
-            let series = Series::new(variant_name(run.variant), self.points(run, &signal));
-            match run.variant {
-                Variant::Ftc => series.ink(Ink::Blue),
-                Variant::NoFtc => series.ink(Ink::Vermilion).dash(Dash::Dashed).secondary(),
-                Variant::ToldTheFault => series.ink(Ink::Green).weight(Weight::Broad),
-                Variant::Additive => series.ink(Ink::Purple).dash(Dash::Dotted).secondary(),
-                Variant::Predictive => series.ink(Ink::Purple).dash(Dash::Dashed),
-            }
-        })
-        .collect()
+        RANKING
+            .into_iter()
+            .rev()
+            .filter_map(|variant| find(self.trajectories, variant))
+            .map(|run| {
+                let series = Series::new(variant_name(run.variant), self.points(run, &signal));
+                match run.variant {
+                    Variant::Ftc => series.ink(Ink::Blue),
+                    Variant::NoFtc => series.ink(Ink::Vermilion).dash(Dash::Dashed).secondary(),
+                    Variant::ToldTheFault => series.ink(Ink::Green).weight(Weight::Broad),
+                    Variant::Additive => series.ink(Ink::Ochre).dash(Dash::Dashed).secondary(),
+                    Variant::Predictive => series.ink(Ink::Purple).dash(Dash::Chain).secondary(),
+                }
+            })
+            .collect()
     }
 
     fn points(&self, run: &Trajectory, signal: impl Fn(&Record) -> f64) -> Vec<Point> {

@@ -55,6 +55,15 @@ fn replace(folder: &Path, path: &Path, content: &str) -> Result<()> {
     attempt().with_context(|| format!("cannot write {}", path.display()))
 }
 
+/// Every variant, the one the page is about first.
+const RANKING: [Variant; 5] = [
+    Variant::Ftc,
+    Variant::ToldTheFault,
+    Variant::Predictive,
+    Variant::Additive,
+    Variant::NoFtc,
+];
+
 /// What a variant is called everywhere on the page.
 fn variant_name(variant: Variant) -> &'static str {
     match variant {
@@ -93,7 +102,9 @@ pub(super) fn page(design: &Design, trajectories: &[Trajectory]) -> Page {
                  can do better. Thin grey is what the sensor says in the loop with FTC. Shaded: the fault of this sensor is present.",
             )
             .figures(scene.outputs()),
-        Section::new("Figures of merit").with(Block::Table(tables::merits(design, trajectories))),
+        Section::new("Figures of merit")
+            .with(Block::Table(tables::merits(design, trajectories)))
+            .with(Block::Table(tables::variants(trajectories))),
     ];
     let faults = scene.faults();
     if !faults.is_empty() {

@@ -1,0 +1,95 @@
+//! How one tick's outputs follow a small change of its measurement.
+//!
+//! Between its decisions a tick is affine: with `D` the diagonal of flagged sensors,
+//!
+//! ```text
+//! dr = dy     df_hat = D dr     dy_c = dy - df_hat     dx_hat = H dy_c     du = K dx_hat
+//! ```
+//!
+//! and a bumpless switch adds `G dZ`, the printed additive control `-K C^+ df_hat`. Flags, lost
+//! sensors and inputs at their limits do not move. The reference acts through the integrator,
+//! hence from the next tick on: this tick's outputs do not depend on it.
+
+use super::{Compensate, Controller, ControllerState, Sample};
+use crate::control::compensation::is_measurement;
+use crate::control::kernel;
+use crate::control::parameters::Compensation;
+
+impl Controller {
+    /// Runs a tick on `trial`, then turns its command, state estimate, residual and fault
+    /// estimate into their changes for a small change `dy` (p) of the sample's measurement.
+    ///
+    /// What else is in `trial` means nothing afterwards: give a copy.
+    pub fn differentiate(&self, trial: &mut ControllerState, sample: &Sample<'_>, dy: &[f64]) {
+        let mode = sample.mode.min(self.modes.len().saturating_sub(1));
+        let left = trial.mode.unwrap_or(mode);
+        self.tick(trial, sample);
+        let (estimator, observer) = (&self.parameters.estimator, &self.parameters.observer);
+        let y = sample.measurement;
+        trial.estimator.differentiate(estimator, mode, y, dy);
+        self.differentiate_correction(trial, sample, dy);
+        let corrected = &trial.corrected;
+        trial
+            .observer
+            .differentiate(observer, left, mode, corrected);
+        self.differentiate_command(trial, left, mode, sample.compensate);
+    }
+
+    /// `dy_c`, where the measurement is one.
+    fn differentiate_correction(
+        &self,
+        trial: &mut ControllerState,
+        sample: &Sample<'_>,
+        dy: &[f64],
+    ) {
+        let subtracted = sample.compensate == Compensate::Estimate
+            && self.parameters.compensation == Compensation::VirtualSensor;
+        let changes = trial.estimator.fault.iter().zip(sample.measurement).zip(dy);
+        for (corrected, ((&fault, &y), &dy)) in trial.corrected.iter_mut().zip(changes) {
+            let change = if subtracted { dy - fault } else { dy };
+            let seen = if is_measurement(y) { change } else { 0.0 };
+            *corrected = kernel::bounded_change(*corrected, seen);
+        }
+    }
+
+    /// `du`, zero where the command is at a limit.
+    fn differentiate_command(
+        &self,
+        trial: &mut ControllerState,
+        left: usize,
+        mode: usize,
+        compensate: Compensate<'_>,
+    ) {
+        let Some(gains) = self.parameters.feedback.modes.get(mode) else {
+            return;
+        };
+        let estimate = &trial.observer.estimate;
+        let change = &mut trial.acting;
+        change.fill(0.0);
+        kernel::add_product(change, &gains.state_feedback, estimate);
+        if left != mode
+            && self.parameters.feedback.bumpless
+            && let Some(inverse) = self.integral_inverses.get(mode)
+        {
+            // The integral part takes up what the estimate would have moved.
+            trial.deviation.fill(0.0);
+            kernel::add_scaled(&mut trial.deviation, -1.0, change);
+            trial.integral.fill(0.0);
+            kernel::add_product(&mut trial.integral, inverse, &trial.deviation);
+            kernel::add_product(change, &gains.integral, &trial.integral);
+        }
+        if trial.additive.is_some()
+            && compensate == Compensate::Estimate
+            && let Some(gain) = self.static_gains.get(mode)
+        {
+            trial.substitute.fill(0.0);
+            kernel::add_scaled(&mut trial.substitute, -1.0, &trial.estimator.fault);
+            kernel::add_product(change, gain, &trial.substitute);
+        }
+        let changes = trial.excess.iter().zip(&trial.acting);
+        for (command, (&excess, &change)) in trial.command.iter_mut().zip(changes) {
+            let free = if excess == 0.0 { change } else { 0.0 };
+            *command = kernel::bounded_change(*command, free);
+        }
+    }
+}

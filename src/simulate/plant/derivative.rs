@@ -1,0 +1,151 @@
+//! How the outputs follow small changes of the inputs.
+//!
+//! The mode, the scenario's own signals, a sensor that is silent and a state at its bound do not
+//! move. A sensor that is stuck keeps what it read last, and so the change of that.
+
+use super::{External, PlantSimulator, PlantState};
+use crate::control::kernel;
+use crate::simulate::scenario::FaultKind;
+use crate::simulate::truth::{self, Truth};
+
+/// Small changes of the plant's inputs.
+#[derive(Clone, Copy, Debug)]
+pub struct Change<'a> {
+    /// Of the command (m).
+    pub command: &'a [f64],
+    /// Of the external fault (p).
+    pub fault: &'a [f64],
+    /// Of the external disturbance (s).
+    pub disturbance: &'a [f64],
+}
+
+impl PlantSimulator {
+    /// Runs a tick under input `u` (m) on `trial` and observes its end; then state, outputs,
+    /// fault and disturbance become their changes, where the inputs are changed from the
+    /// beginning of the tick on: `dx = B du + E dw`, or the variational equation of the
+    /// nonlinear plant.
+    ///
+    /// What else is in `trial` means nothing afterwards: give a copy.
+    pub fn differentiate_tick(
+        &self,
+        trial: &mut PlantState,
+        external: &External<'_>,
+        u: &[f64],
+        change: &Change<'_>,
+    ) {
+        self.observe(trial, external);
+        trial.last.fill(0.0);
+        self.differentiate_sensors(trial, external, change, false);
+        self.differentiate_state(trial, u, change);
+        for (x, &change) in trial.x.iter_mut().zip(&trial.next) {
+            *x = kernel::bounded_change(*x, change);
+        }
+        self.differentiate_observation(trial, external, change);
+    }
+
+    /// Turns the state's outputs into their changes where the inputs are changed now, too late
+    /// to move the state: what an observation would see.
+    pub fn differentiate_outputs(
+        &self,
+        trial: &mut PlantState,
+        external: &External<'_>,
+        change: &Change<'_>,
+    ) {
+        trial.x.fill(0.0);
+        trial.last.fill(0.0);
+        self.differentiate_observation(trial, external, change);
+    }
+
+    /// Advances the state, and leaves its change in the scratch.
+    fn differentiate_state(&self, trial: &mut PlantState, u: &[f64], change: &Change<'_>) {
+        if let Truth::Rectifier(rectifier) = &self.truth {
+            truth::differentiate_rectifier(
+                rectifier,
+                trial.mode,
+                &trial.x,
+                &truth::Held {
+                    input: [u, change.command],
+                    disturbance: [&trial.disturbance, change.disturbance],
+                },
+                self.plant.sample_time,
+                &mut trial.next,
+            );
+            self.advance(trial, u);
+        } else {
+            self.advance(trial, u);
+            let mode = &self.plant.modes[trial.mode];
+            trial.next.fill(0.0);
+            kernel::add_product(&mut trial.next, &mode.b, change.command);
+            kernel::add_product(&mut trial.next, &mode.e, change.disturbance);
+        }
+    }
+
+    /// The changes of all outputs, from that of the state.
+    fn differentiate_observation(
+        &self,
+        trial: &mut PlantState,
+        external: &External<'_>,
+        change: &Change<'_>,
+    ) {
+        trial.mode = self.active_mode(external, trial.tick);
+        self.differentiate_sensors(trial, external, change, true);
+        trial.reference.fill(0.0);
+        kernel::copy(&mut trial.disturbance, change.disturbance);
+    }
+
+    /// `dy_true = C dx + F dw`, and what the sensors make of it; `dx` counts if the state `moved`.
+    fn differentiate_sensors(
+        &self,
+        trial: &mut PlantState,
+        external: &External<'_>,
+        change: &Change<'_>,
+        moved: bool,
+    ) {
+        let mode = &self.plant.modes[trial.mode];
+        trial.y_true.fill(0.0);
+        if moved {
+            kernel::add_product(&mut trial.y_true, &mode.c, &trial.x);
+        }
+        kernel::add_product(&mut trial.y_true, &mode.f, change.disturbance);
+        for (sensor, &added) in change.fault.iter().enumerate() {
+            self.differentiate_sensor(trial, sensor, added, external.mode.is_none());
+        }
+    }
+
+    /// The same steps as a reading takes, for its change.
+    fn differentiate_sensor(
+        &self,
+        trial: &mut PlantState,
+        sensor: usize,
+        added: f64,
+        events: bool,
+    ) {
+        let (tick, te) = (trial.tick, self.plant.sample_time);
+        let healthy = trial.y_true[sensor];
+        let mut reading = healthy + added;
+        let (mut struck, mut silent) = (false, false);
+        for event in &self.scenario.events {
+            if !(events && event.sensor == sensor && event.active(tick, te)) {
+                continue;
+            }
+            struck = true;
+            match event.kind {
+                FaultKind::Bias { .. }
+                | FaultKind::Drift { .. }
+                | FaultKind::Intermittent { .. } => {}
+                FaultKind::GainLoss { loss } => reading *= 1.0 - loss,
+                FaultKind::Stuck => (reading, silent) = (trial.last[sensor], false),
+                FaultKind::Dropout => silent = true,
+            }
+        }
+        if silent {
+            (trial.y[sensor], trial.fault[sensor]) = (0.0, 0.0);
+            return;
+        }
+        if !struck {
+            trial.last[sensor] = reading;
+        }
+        trial.y[sensor] = reading;
+        trial.fault[sensor] = reading - healthy;
+    }
+}

@@ -1,0 +1,305 @@
+//! Directional derivatives of a tick, against central differences of the tick itself.
+//!
+//! Between its decisions a tick of the linear parts is affine, so the differences are exact but
+//! for rounding; the rectifier's are as good as its integrator.
+
+mod common;
+
+use common::{Channel, controller, plant, reference, scenario};
+use ftc::control::parameters::{Compensation, EstimatorMethod, Limits};
+use ftc::control::{Compensate, Controller, ControllerParameters, ControllerState, Sample};
+use ftc::plant::rectifier::Rectifier;
+use ftc::simulate::plant::{Change, External};
+use ftc::simulate::scenario::{FaultEvent, FaultKind, ModeInterval, Waveform};
+use ftc::simulate::{PlantSimulator, PlantState, Scenario, Truth};
+use nalgebra::DMatrix;
+use proptest::prelude::*;
+
+/// Half the distance of the differences.
+const STEP: f64 = 1e-4;
+
+#[derive(Clone, Copy, Debug)]
+struct Design {
+    compensation: Compensation,
+    method: EstimatorMethod,
+    latency: usize,
+    bumpless: bool,
+    limited: bool,
+    adapt: bool,
+}
+
+fn design() -> impl Strategy<Value = Design> {
+    let compensation = prop::sample::select(vec![
+        Compensation::VirtualSensor,
+        Compensation::Additive,
+        Compensation::None,
+    ]);
+    let method = prop::sample::select(vec![
+        EstimatorMethod::Reference,
+        EstimatorMethod::Sliding,
+        EstimatorMethod::None,
+    ]);
+    let flags = (any::<bool>(), any::<bool>(), any::<bool>());
+    (compensation, method, 0..2usize, flags).prop_map(|(compensation, method, latency, flags)| {
+        Design {
+            compensation,
+            method,
+            latency,
+            bumpless: flags.0,
+            limited: flags.1,
+            adapt: flags.2,
+        }
+    })
+}
+
+fn parameters(design: Design) -> ControllerParameters {
+    let mut parameters = controller(Channel::State, 0.005);
+    parameters.compensation = design.compensation;
+    parameters.estimator.method = design.method;
+    parameters.estimator.adapt = design.adapt;
+    parameters.feedback.latency = design.latency;
+    parameters.feedback.bumpless = design.bumpless;
+    if design.latency == 1 {
+        for gains in &mut parameters.feedback.modes {
+            gains.previous_input = DMatrix::from_element(2, 2, -0.2);
+        }
+    }
+    if design.limited {
+        parameters.input_limits = vec![
+            Limits {
+                min: Some(-0.1),
+                max: Some(0.1),
+            };
+            2
+        ];
+    }
+    parameters
+}
+
+/// Command, state estimate, residual and fault estimate, one after another.
+fn outputs(state: &ControllerState) -> Vec<f64> {
+    let parts = [
+        &state.command,
+        &state.observer.estimate,
+        &state.estimator.residual,
+        &state.estimator.fault,
+    ];
+    parts.into_iter().flatten().copied().collect()
+}
+
+/// Everything a tick decides: what must not change between the points of a difference.
+fn decisions(controller: &Controller, state: &ControllerState) -> Vec<bool> {
+    let limits = &controller.parameters().input_limits;
+    let at_limit = state
+        .command
+        .iter()
+        .zip(limits)
+        .map(|(u, limit)| Some(*u) == limit.min || Some(*u) == limit.max);
+    let flags = state.estimator.flagged.iter().copied();
+    flags.chain(at_limit).collect()
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(300))]
+
+    #[test]
+    fn the_controller_follows_its_measurement(
+        design in design(),
+        ticks in 1..120u64,
+        switch in 0..120u64,
+        fault in prop::sample::select(vec![0.0, 0.4, f64::NAN]),
+        direction in prop::array::uniform2(-1.0..1.0f64),
+        reference in prop::array::uniform2(-1.0..1.0f64),
+        believe in any::<bool>(),
+    ) {
+        let controller = Controller::new(parameters(design));
+        let thresholds = controller.parameters().estimator.thresholds.clone();
+        let compensate = if believe { Compensate::Nothing } else { Compensate::Estimate };
+        let mut state = controller.initial_state(0);
+        let mut x = [0.0; 2];
+        let mut last = None;
+        for tick in 0..=ticks {
+            // A plant of no importance, so that the inputs excite something.
+            x = [0.6 * x[0] + state.command[1], 0.3 * x[1] + state.command[0]];
+            let fault = if tick + 20 > ticks { fault } else { 0.0 };
+            let y = [x[0] + fault, x[1] + 0.01 * (tick as f64).sin()];
+            let mode = usize::from(tick >= switch);
+            let sample = |y: &[f64; 2], state: &mut ControllerState, derive: Option<&[f64; 2]>| {
+                let sample = Sample {
+                    tick, mode, measurement: y, reference: &reference, thresholds: &thresholds, compensate,
+                };
+                match derive {
+                    Some(dy) => controller.differentiate(state, &sample, dy),
+                    None => controller.tick(state, &sample),
+                }
+            };
+            if tick == ticks {
+                let mut points = [-STEP, STEP].map(|step| {
+                    let moved = [y[0] + step * direction[0], y[1] + step * direction[1]];
+                    let mut trial = state.clone();
+                    sample(&moved, &mut trial, None);
+                    trial
+                });
+                let [below, above] = &mut points;
+                let unmoved = decisions(&controller, below) == decisions(&controller, above);
+                let expected: Vec<f64> = outputs(below).iter().zip(outputs(above))
+                    .map(|(below, above)| (above - below) / (2.0 * STEP)).collect();
+                let mut trial = state.clone();
+                sample(&y, &mut trial, Some(&direction));
+                last = Some((unmoved, expected, outputs(&trial)));
+            }
+            sample(&y, &mut state, None);
+        }
+        let (unmoved, expected, found) = last.unwrap();
+        prop_assume!(unmoved);
+        for (found, expected) in found.iter().zip(&expected) {
+            prop_assert!((found - expected).abs() < 1e-9 * (1.0 + expected.abs()), "{found} against {expected}");
+        }
+    }
+}
+
+/// Faults of every kind, overlapping, around tick 5.
+fn eventful() -> Scenario {
+    let event = |sensor, from, until, kind| FaultEvent {
+        sensor,
+        from,
+        until,
+        kind,
+    };
+    Scenario {
+        schedule: vec![
+            ModeInterval { from: 0.0, mode: 0 },
+            ModeInterval { from: 6.0, mode: 1 },
+        ],
+        events: vec![
+            event(0, 3.0, 5.0, FaultKind::GainLoss { loss: 0.3 }),
+            event(0, 4.0, 6.0, FaultKind::Bias { size: 0.2 }),
+            event(1, 4.0, 7.0, FaultKind::Stuck),
+            event(0, 8.0, 10.0, FaultKind::Dropout),
+            event(1, 8.0, 10.0, FaultKind::Drift { slope: 0.1 }),
+            event(1, 9.0, 10.0, FaultKind::GainLoss { loss: 0.5 }),
+        ],
+        ..scenario(reference("square"), 0.005, 1)
+    }
+}
+
+fn rectifier() -> (PlantSimulator, [f64; 2]) {
+    let rectifier = Rectifier {
+        inductance: 0.01,
+        resistance: 0.3,
+        capacitance: 2e-3,
+        phase_voltage: 311.0,
+        current_loop: 2e-3,
+        dc_voltage: 600.0,
+        loads: vec![80.0, 40.0],
+    };
+    let plant = rectifier.linearise(5e-3).unwrap();
+    let scenario = Scenario {
+        schedule: vec![ModeInterval { from: 0.0, mode: 0 }],
+        disturbance: vec![Waveform::Constant { value: 1.0 }],
+        ..scenario(reference("constant"), 0.0, 1)
+    };
+    let simulator = PlantSimulator::with_truth(plant, Truth::Rectifier(rectifier), scenario);
+    (simulator, [12.0, -3.0])
+}
+
+/// State, outputs, fault and disturbance, one after another; a silent sensor reads zero.
+fn seen(state: &PlantState) -> Vec<f64> {
+    let parts = [
+        &state.x,
+        &state.y_true,
+        &state.y,
+        &state.fault,
+        &state.disturbance,
+    ];
+    let values = parts.into_iter().flatten();
+    values.map(|v| if v.is_nan() { 0.0 } else { *v }).collect()
+}
+
+/// Changes of command, fault and disturbance.
+const DIRECTIONS: [[f64; 5]; 4] = [
+    [1.0, 0.0, 0.0, 0.0, 0.0],
+    [0.0, 1.0, 0.5, 0.0, 0.0],
+    [0.3, -0.2, 0.0, 1.0, 0.4],
+    [0.0, 0.0, 0.0, 0.0, 1.0],
+];
+
+/// Compares at every tick, and within each, under `u`; `mode` is the external mode.
+fn compare(simulator: &PlantSimulator, u: [f64; 2], mode: Option<usize>, step: f64, accuracy: f64) {
+    let mut state = simulator.initial_state();
+    for _ in 0..12 {
+        for direction in DIRECTIONS {
+            let at = |size: f64, state: &PlantState, whole: bool, derive: bool| {
+                let scaled = direction.map(|d| size * d);
+                let base = if derive { [0.0; 5] } else { scaled };
+                let external = External {
+                    fault: &[0.1 + base[2], base[3]],
+                    disturbance: &[0.05 + base[4]],
+                    mode,
+                    noise: true,
+                };
+                let u = [u[0] + base[0], u[1] + base[1]];
+                let change = Change {
+                    command: &direction[..2],
+                    fault: &direction[2..4],
+                    disturbance: &direction[4..],
+                };
+                let mut trial = state.clone();
+                match (derive, whole) {
+                    (true, true) => {
+                        simulator.differentiate_tick(&mut trial, &external, &u, &change)
+                    }
+                    (true, false) => {
+                        simulator.differentiate_outputs(&mut trial, &external, &change)
+                    }
+                    (false, whole) => {
+                        if whole {
+                            simulator.observe(&mut trial, &external);
+                            simulator.advance(&mut trial, &u);
+                        }
+                        simulator.observe(&mut trial, &external);
+                    }
+                }
+                seen(&trial)
+            };
+            for whole in [true, false] {
+                let (below, above) = (
+                    at(-step, &state, whole, false),
+                    at(step, &state, whole, false),
+                );
+                let found = at(0.0, &state, whole, true);
+                for ((below, above), found) in below.iter().zip(&above).zip(&found) {
+                    let expected = (above - below) / (2.0 * step);
+                    assert!(
+                        (found - expected).abs() < accuracy * (1.0 + expected.abs()),
+                        "tick {}, {direction:?}: {found} against {expected}",
+                        state.tick
+                    );
+                }
+            }
+        }
+        let external = External {
+            fault: &[0.1, 0.0],
+            disturbance: &[0.05],
+            mode,
+            noise: true,
+        };
+        simulator.observe(&mut state, &external);
+        simulator.advance(&mut state, &u);
+    }
+}
+
+#[test]
+fn the_plant_follows_its_inputs() {
+    for channel in [Channel::State, Channel::Output] {
+        let simulator = PlantSimulator::new(plant(channel), eventful());
+        compare(&simulator, [0.3, -0.2], None, STEP, 1e-9);
+        compare(&simulator, [0.3, -0.2], Some(1), STEP, 1e-9);
+    }
+}
+
+#[test]
+fn the_rectifier_follows_its_inputs() {
+    let (simulator, u) = rectifier();
+    compare(&simulator, u, None, 1e-2, 1e-5);
+}
