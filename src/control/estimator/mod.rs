@@ -1,9 +1,9 @@
 //! The sensor-fault estimator: data-based projection with a reference window (41)-(62).
 //!
 //! A healthy database of inputs `U1` and outputs `Y1` fixes, by projection, what the output must
-//! be: `y_hat = y0 + Y1 U1^+ phi` ([`predictor`]). What the periodic disturbance adds is learned
-//! on line while all is well ([`harmonics`]). The residual is what remains; each sensor's residual
-//! is judged against its own threshold ([`decision`]), widened by how far the present input lies
+//! be: `y_hat = y0 + Y1 U1^+ phi` (`predictor`). What the periodic disturbance adds is learned
+//! on line while all is well (`harmonics`). The residual is what remains; each sensor's residual
+//! is judged against its own threshold (`decision`), widened by how far the present input lies
 //! from those the database knows.
 
 mod adaptation;
