@@ -26,13 +26,14 @@ fn main() {
     let models = [Model::controller(&design), Model::plant(&design)];
     let functions = libraries.each_ref().map(|library| library.functions);
     let mut closed = Loop::new(functions, models.each_ref(), 0.0);
+    let measured = closed.plant.span("y");
     // Memory is read once everything is warm.
     let (warm, began) = (ticks / 100 + 1, Instant::now());
     let (mut memory, mut largest) = (0, 0.0_f64);
     for k in 0..ticks {
         closed.step_to((k + 1) as f64, Coupling::GaussSeidel, true);
         let mut values = [0.0; 2];
-        closed.plant.get_into(closed.plant.span("y"), &mut values);
+        closed.plant.get_into(measured, &mut values);
         largest = values.iter().fold(largest, |most, value| {
             assert!(value.is_finite(), "tick {k}: {values:?}");
             most.max(value.abs())

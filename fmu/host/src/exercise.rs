@@ -14,7 +14,7 @@ fn reals(it: &Instance, causality: Causality) -> Vec<u32> {
 /// Prepares an initialized instance; the result makes `ticks` steps and leaves nothing undone:
 /// inputs of all kinds (also no numbers), all outputs, steps within ticks, saved states,
 /// derivatives, inquiries.
-pub fn exercise(it: &Instance, ticks: u32) -> impl FnMut() {
+pub fn exercise(it: &Instance, ticks: u32) -> impl FnMut() + use<> {
     let (inputs, outputs) = (reals(it, Causality::Input), reals(it, Causality::Output));
     let measured = it.table.vector("y").first;
     let mode = it.table.vector("mode").first;

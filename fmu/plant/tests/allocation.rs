@@ -15,8 +15,8 @@ fn nothing_is_allocated_on_line() {
     let it = Instance::new(functions, &model).unwrap();
     it.silence();
     it.initialize(0.0, |_| ());
-    let run = exercise(&it, 900);
-    assert_eq!(allocations(run), 0);
+    let mut run = exercise(&it, 900);
+    assert_eq!(allocations(&mut run), 0);
     // SAFETY: the instance lives.
     let end = || assert_eq!(unsafe { (functions.terminate)(it.c) }, Status::Ok);
     assert_eq!(allocations(end), 0);

@@ -1,5 +1,7 @@
 //! What the real controller and plant binaries promise, loaded as an importer loads them.
 
+#![allow(missing_docs, reason = "tests have names")]
+
 mod derivatives;
 mod inputs;
 mod resources;

@@ -57,7 +57,7 @@ fn a_library_is_unloaded_and_loaded_again() {
     let first = run(&mut closed);
     drop(closed);
     let Pair { libraries, models } = pair;
-    libraries.map(fmu_host::Library::unload);
+    libraries.into_iter().for_each(fmu_host::Library::unload);
     let again = Pair {
         models,
         ..Pair::new()
