@@ -46,7 +46,7 @@ memcheck: build
 lint: $(VENV)/ready
 	cargo fmt --all --check
 	cargo clippy --workspace --all-targets -- -D warnings
-	RUSTDOCFLAGS="-D warnings" cargo doc --workspace --no-deps --document-private-items
+	RUSTDOCFLAGS="-D warnings" cargo doc --workspace --no-deps
 	$(IN_VENV)ruff check
 	$(IN_VENV)ruff format --check
 

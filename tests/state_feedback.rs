@@ -208,7 +208,7 @@ fn the_rectifier_in_si_units_meets_its_decay() {
 fn random_plants_are_designed_certified_and_do_what_was_promised() {
     for (sample_time, decay) in [(0.1, 0.97), (0.01, 0.995)] {
         let mut designed = 0;
-        for seed in 0..15 {
+        for seed in 0..9 {
             let plant = random_plant(seed, sample_time);
             let lyapunov =
                 [Lyapunov::Common, Lyapunov::Switched, Lyapunov::Dwell][seed as usize % 3];
@@ -245,7 +245,7 @@ fn random_plants_are_designed_certified_and_do_what_was_promised() {
                 );
             }
         }
-        assert!(designed >= 9, "{designed} designs at {sample_time} s");
+        assert!(designed >= 6, "{designed} designs at {sample_time} s");
     }
 }
 

@@ -1,6 +1,6 @@
 //! From what is asked for to a finished design: gains, observer, predictor, thresholds, record.
 
-use super::commissioning::{self, LONGEST_RESPONSE};
+use super::commissioning::{self, Database, LONGEST_RESPONSE, RecordedDisturbance};
 use super::harmonics;
 use super::{
     ControlSpec, Design, DesignError, FORMAT, ObserverSpec, Signal, Signals, check_controllable,
@@ -57,12 +57,14 @@ pub struct EstimatorSpec {
 }
 
 /// Where the healthy database comes from.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq)]
 pub enum DatabaseSource {
     /// A commissioning run on the plant model.
     Commission,
     /// The model's own Markov parameters.
     Model,
+    /// Logs of healthy operation, one per mode.
+    Recorded(Vec<Database>),
 }
 
 /// How thresholds are chosen.
@@ -106,6 +108,9 @@ const LARGEST_FAULT: f64 = 1e6;
 
 /// Seed of the commissioning run; any will do, but the same design must give the same bytes.
 const COMMISSIONING_SEED: u64 = 20;
+
+/// Least ratio of the weakest to the strongest excited direction of a recorded database.
+const LEAST_EXCITATION: f64 = 1e-4;
 
 /// Samples a sliding window holds beyond those its own inputs can explain.
 const WINDOW_MARGIN: usize = 20;
@@ -239,7 +244,7 @@ fn predictors(request: &Request, length: usize) -> Result<Vec<Predictor>, String
     let noise = &request.scenario.noise;
     let predictor = |(index, mode): (usize, &Mode)| {
         let amplitudes = amplitudes(mode, &request.signals.inputs);
-        match request.estimator.database {
+        match &request.estimator.database {
             DatabaseSource::Model => Ok(commissioning::model_predictor(
                 mode,
                 length,
@@ -251,13 +256,35 @@ fn predictors(request: &Request, length: usize) -> Result<Vec<Predictor>, String
                 let seed = COMMISSIONING_SEED + index as u64;
                 let database =
                     commissioning::commission(mode, &amplitudes, noise, length + counted, seed);
-                commissioning::predictor(&database, length)
+                commissioning::predictor(&database, length, None)
                     .map_err(|what| format!("mode {}: {what}", index + 1))
             }
+            DatabaseSource::Recorded(databases) => recorded(request, &databases[index], length)
+                .map_err(|what| format!("mode {}: {what}", index + 1)),
         }
     };
     let modes = request.plant.modes.iter();
     modes.enumerate().map(predictor).collect()
+}
+
+/// The predictor of a recorded database, in which the disturbance was at work.
+fn recorded(request: &Request, database: &Database, length: usize) -> Result<Predictor, String> {
+    let known = request.estimator.disturbance.as_ref();
+    let disturbance = known.map(|known| RecordedDisturbance {
+        period: known.period / request.plant.sample_time,
+        count: known.harmonics,
+    });
+    let predictor = commissioning::predictor(database, length, disturbance)?;
+    let (ratio, input, lag) = commissioning::weakest_direction(&predictor, database.inputs.ncols());
+    if ratio < LEAST_EXCITATION {
+        return Err(format!(
+            "the database excites input {} {lag} samples back too little (1 : {:.0e} of the strongest direction): \
+             record a run in which every input moves on its own",
+            input + 1,
+            1.0 / ratio.max(f64::MIN_POSITIVE)
+        ));
+    }
+    Ok(predictor)
 }
 
 /// How far each input may be moved about the operating point: its nominal value, or less where a

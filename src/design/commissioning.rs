@@ -90,17 +90,36 @@ pub fn commission(
     Database { inputs, outputs }
 }
 
+/// A periodic disturbance present while a database was recorded.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct RecordedDisturbance {
+    /// Period in samples.
+    pub period: f64,
+    /// Number of harmonics.
+    pub count: usize,
+}
+
 /// The predictor of a database by least squares.
+///
+/// A disturbance of known period is explained by sines and cosines of its own, which are then
+/// dropped: their phases belong to the recording. They stand first in the factorisation, so the
+/// trailing part of `R` belongs to what of the inputs they cannot explain.
 ///
 /// A vanishing ridge keeps `R` regular when the database excites too little; such directions then
 /// have an enormous leverage and are never trusted.
 ///
 /// # Errors
 /// The database has too few samples for `response_length`.
-pub fn predictor(database: &Database, response_length: usize) -> Result<Predictor, String> {
+pub fn predictor(
+    database: &Database,
+    response_length: usize,
+    disturbance: Option<RecordedDisturbance>,
+) -> Result<Predictor, String> {
     let (total, m) = database.inputs.shape();
     let p = database.outputs.ncols();
-    let unknowns = m * response_length;
+    let waves = disturbance.map_or(0, |known| 2 * known.count);
+    let inputs = m * response_length;
+    let unknowns = waves + inputs;
     let samples = total.saturating_sub(response_length);
     if samples <= unknowns {
         return Err(format!(
@@ -108,10 +127,28 @@ pub fn predictor(database: &Database, response_length: usize) -> Result<Predicto
             unknowns + response_length + 1
         ));
     }
+    let wave = |k: usize, column: usize| {
+        let period = disturbance.map_or(1.0, |known| known.period);
+        let angle = core::f64::consts::TAU * (column / 2 + 1) as f64 * k as f64 / period;
+        if column.is_multiple_of(2) {
+            angle.sin()
+        } else {
+            angle.cos()
+        }
+    };
     let regressors = DMatrix::from_fn(samples, unknowns, |k, column| {
-        database.inputs[(k + column / m, column % m)]
+        match column.checked_sub(waves) {
+            None => wave(k, column),
+            Some(past) => database.inputs[(k + past / m, past % m)],
+        }
     });
-    let ridge = 1e-9 * regressors.norm() / (unknowns as f64).sqrt();
+    let ridge = 1e-9 * regressors.columns(waves, inputs).norm() / (inputs as f64).sqrt();
+    if ridge == 0.0 {
+        return Err(
+            "the database excites nothing: every recorded input stays at its operating point"
+                .into(),
+        );
+    }
     let mut stacked = regressors
         .clone()
         .resize_vertically(samples + unknowns, 0.0);
@@ -127,7 +164,7 @@ pub fn predictor(database: &Database, response_length: usize) -> Result<Predicto
     let factor = qr.r();
     let solution = factor
         .solve_upper_triangular(&rotated.rows(0, unknowns).into_owned())
-        .ok_or("the database excites nothing: every recorded input is zero")?;
+        .ok_or("the database cannot be factorised: its inputs are not finite")?;
     let error = targets - regressors * &solution;
     let freedom = (samples - unknowns) as f64;
     let deviation = error
@@ -135,11 +172,24 @@ pub fn predictor(database: &Database, response_length: usize) -> Result<Predicto
         .map(|column| (column.norm_squared() / freedom).sqrt())
         .collect();
     Ok(Predictor {
-        response: solution.transpose(),
-        factor,
+        response: solution.rows(waves, inputs).transpose(),
+        factor: factor.view((waves, waves), (inputs, inputs)).into_owned(),
         deviation,
         samples,
     })
+}
+
+/// How well each input was excited: the smallest singular value of `R` over the largest, and the
+/// input (0-based) and lag (samples, from 1) that weigh most in the direction excited least.
+pub fn weakest_direction(predictor: &Predictor, inputs: usize) -> (f64, usize, usize) {
+    let svd = predictor.factor.clone().svd(false, true);
+    let values = &svd.singular_values;
+    let ratio = values.min() / values.max().max(f64::MIN_POSITIVE);
+    let heaviest = svd
+        .v_t
+        .map_or(0, |v_t| v_t.row(values.imin()).transpose().iamax());
+    let lag = predictor.factor.nrows() / inputs - heaviest / inputs;
+    (ratio, heaviest % inputs, lag)
 }
 
 /// The predictor from the model's own Markov parameters `[C A^(j-1) B ... C B]` (48), with the
@@ -204,7 +254,7 @@ mod tests {
             let mode = stable_mode(&entries);
             let length = response_length(std::slice::from_ref(&mode)).unwrap();
             let samples = length + commissioning_samples(2, length);
-            let found = predictor(&commission(&mode, &[1.0, 2.0], &[0.0, 0.0], samples, 3), length).unwrap();
+            let found = predictor(&commission(&mode, &[1.0, 2.0], &[0.0, 0.0], samples, 3), length, None).unwrap();
             let exact = model_predictor(&mode, length, &[1.0, 2.0], &[0.0, 0.0]);
             let scale = exact.response.norm().max(1e-3);
             prop_assert!((found.response - exact.response).norm() <= 1e-5 * scale);
@@ -218,6 +268,7 @@ mod tests {
         let found = predictor(
             &commission(&mode, &[1.0, 1.0], &[0.05, 0.2], samples, 9),
             10,
+            None,
         )
         .unwrap();
         for (got, want) in found.deviation.iter().zip([0.05, 0.2]) {
@@ -228,13 +279,51 @@ mod tests {
     #[test]
     fn a_direction_never_excited_has_enormous_leverage() {
         let mode = stable_mode(&[0.4; 21]);
-        let found = predictor(&commission(&mode, &[1.0, 0.0], &[0.0, 0.0], 200, 1), 5).unwrap();
+        let found = predictor(
+            &commission(&mode, &[1.0, 0.0], &[0.0, 0.0], 200, 1),
+            5,
+            None,
+        )
+        .unwrap();
         let mut scratch = vec![0.0; 10];
         let mut phi = vec![0.0; 10];
         phi[0] = 1.0;
         assert!(crate::control::estimator::leverage(&found.factor, &phi, &mut scratch) < 1.0);
         phi[1] = 1.0;
         assert!(crate::control::estimator::leverage(&found.factor, &phi, &mut scratch) > 1e6);
+    }
+
+    /// A sine on the outputs is explained away, not taken for the plant's response.
+    #[test]
+    fn a_recorded_disturbance_does_not_spoil_the_response() {
+        let mode = stable_mode(&[0.3; 21]);
+        let mut database = commission(&mode, &[1.0, 2.0], &[0.0, 0.0], 600, 3);
+        let period = 37.0;
+        for (k, mut row) in database.outputs.row_iter_mut().enumerate() {
+            row[0] += 0.7 * (core::f64::consts::TAU * k as f64 / period + 0.4).sin();
+        }
+        let length = response_length(std::slice::from_ref(&mode)).unwrap();
+        let exact = model_predictor(&mode, length, &[1.0, 2.0], &[0.0, 0.0]).response;
+        let known = RecordedDisturbance { period, count: 1 };
+        let error = |disturbance| {
+            (predictor(&database, length, disturbance).unwrap().response - &exact).norm()
+                / exact.norm()
+        };
+        assert!(error(Some(known)) < 1e-5, "{}", error(Some(known)));
+        assert!(error(None) > 1e-2);
+    }
+
+    #[test]
+    fn the_weakest_direction_is_the_input_that_never_moved() {
+        let mode = stable_mode(&[0.4; 21]);
+        let found = predictor(
+            &commission(&mode, &[1.0, 0.0], &[0.0, 0.0], 200, 1),
+            5,
+            None,
+        )
+        .unwrap();
+        let (ratio, input, _) = weakest_direction(&found, 2);
+        assert!(ratio < 1e-6 && input == 1);
     }
 
     #[test]

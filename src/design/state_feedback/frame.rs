@@ -7,6 +7,7 @@
 
 use crate::design::augmented::AugmentedMode;
 use crate::design::certificate::FactoredLyapunov;
+use crate::plant::spectral_radius;
 use nalgebra::DMatrix;
 
 /// Gains and Lyapunov matrix of one mode.
@@ -57,6 +58,33 @@ impl Frame {
             disturbance: 1.0,
             performance: 1.0,
         })
+    }
+
+    /// Coordinates in which the inputs reach every direction about equally, from the mean of the
+    /// modes' reachability Gramians over `REACH` samples: at small sample times the plain margin
+    /// problem hardly sees the states far from the inputs. `None` when some are not reached at all.
+    pub fn of_reachable(models: &[AugmentedMode], group: &[usize]) -> Option<Self> {
+        const REACH: usize = 500;
+        let gramian = |model: &AugmentedMode| {
+            let shrink = 1.0 / spectral_radius(&model.a).max(1.0);
+            let mut reached = model.b.clone();
+            let mut sum = &reached * reached.transpose();
+            for _ in 0..REACH {
+                reached = shrink * (&model.a * reached);
+                sum += &reached * reached.transpose();
+            }
+            let scale = sum.nrows() as f64 / sum.trace();
+            sum * scale
+        };
+        let parts: Vec<Part> = group
+            .iter()
+            .map(|&mode| Part {
+                mode,
+                gain: models[mode].b.transpose(),
+                lyapunov: FactoredLyapunov::plain(gramian(&models[mode])),
+            })
+            .collect();
+        Self::of(&parts)
     }
 
     /// Coordinates from a stabilising solution, with the units in which disturbance and closed-loop

@@ -75,9 +75,27 @@ pub(super) fn is_feasible(plant: &SwitchedPlant, spec: &ControlSpec, scaling: &S
     let units = Units::choose(plant, spec, scaling);
     let models = augment(plant, spec, &units);
     spec.lyapunov.groups(models.len()).iter().all(|group| {
-        let found = theorem::stabilise(&models, spec, group);
-        found.is_ok_and(|(margin, _)| margin.margin > 1e3 * SMALLEST_MARGIN)
+        let found = stable(&models, spec, group);
+        found.is_ok_and(|(margin, parts)| parts.is_some() && margin.margin > 1e3 * SMALLEST_MARGIN)
     })
+}
+
+/// Stabilising gains of a group with their margin, sought in the design's coordinates and, where
+/// these show none, in reachability coordinates; no gains where neither does.
+fn stable(
+    models: &[AugmentedMode],
+    spec: &ControlSpec,
+    group: &[usize],
+) -> Result<(Margin, Option<Vec<Part>>), SolverFailure> {
+    let (margin, parts) = theorem::stabilise(models, spec, group)?;
+    if margin.margin >= SMALLEST_MARGIN {
+        return Ok((margin, Some(parts)));
+    }
+    let again = Frame::of_reachable(models, group).and_then(|frame| {
+        let (margin, parts) = theorem::stabilise(&frame.view(models), spec, group).ok()?;
+        (margin.margin >= 1e3 * SMALLEST_MARGIN).then(|| (margin, Some(frame.restore(parts))))
+    });
+    Ok(again.unwrap_or((margin, None)))
 }
 
 /// Whether a group of modes can be stabilised as asked.
@@ -103,10 +121,10 @@ impl Road<'_> {
     /// Stabilising gains of a group (T1): solved, and solved again in the coordinates the solution
     /// suggests as long as its margin is thin and doubles.
     fn stabilised(&self, group: &[usize]) -> Result<Verdict, SolverFailure> {
-        let (margin, mut parts) = theorem::stabilise(&self.models, self.spec, group)?;
-        if margin.margin < SMALLEST_MARGIN {
-            return Ok(Verdict::Conflict(margin));
-        }
+        let (margin, mut parts) = match stable(&self.models, self.spec, group)? {
+            (margin, Some(parts)) => (margin, parts),
+            (margin, None) => return Ok(Verdict::Conflict(margin)),
+        };
         let mut thickness = margin.margin;
         for _ in 0..REFRAMINGS {
             let frame = Frame::of_stabilised(&self.models, &parts);

@@ -38,11 +38,11 @@ pub fn mismatch(text: &str, path: &Path, error: &toml::de::Error) -> String {
     let quoted = quotations(&message);
     let table = key(path);
     let inside = |name: &str| {
-        let own = table.rsplit(['.', ' ']).next() == Some(name);
-        if table.is_empty() || own {
-            format!("{table}{}", if own { "" } else { name })
+        let already = table.rsplit(['.', ' ']).next() == Some(name);
+        if already {
+            table.clone()
         } else {
-            format!("{table}.{name}")
+            join(&table, name)
         }
     };
     match (
@@ -85,18 +85,23 @@ fn key(path: &Path) -> String {
                 segments.next();
             }
             (Segment::Map { key } | Segment::Enum { variant: key }, _) => {
-                out.push_str(match out.chars().last() {
-                    None => "",
-                    Some(':') => " ",
-                    Some(_) => ".",
-                });
-                out.push_str(&shorten(key));
+                out = join(&out, &shorten(key));
             }
             (Segment::Seq { index }, _) => out.push_str(&format!("[{}]", index + 1)),
             (Segment::Unknown, _) => {}
         }
     }
     out
+}
+
+/// A key inside a table.
+fn join(table: &str, key: &str) -> String {
+    let separator = match table.chars().last() {
+        None => "",
+        Some(':') => " ",
+        Some(_) => ".",
+    };
+    format!("{table}{separator}{key}")
 }
 
 /// The words a message puts between back-quotes.
@@ -114,6 +119,7 @@ fn plain_types(message: &str) -> String {
         ("invalid type: map", "a table stands here"),
         ("invalid type: sequence", "a list stands here"),
         ("invalid type: ", "this is a "),
+        (" as i128", ""),
         ("this is a integer", "this is the integer"),
         ("this is a floating point", "this is the number"),
     ]
