@@ -28,7 +28,7 @@ bench: build
 
 # Fuzzing needs cargo-fuzz and a C++ compiler; SECONDS and TARGETS may be set.
 SECONDS ?= 30
-TARGETS ?= controller_calls plant_calls design state location
+TARGETS ?= controller_calls plant_calls controller_design plant_design state location
 
 fuzz:
 	cd fmu/fuzz && for target in $(TARGETS); do RUSTC_BOOTSTRAP=1 \
@@ -40,8 +40,8 @@ soak:
 	cargo run --release --package fmu-host --example soak -- $(TICKS)
 
 # valgrind's memcheck over the C program of tests/c on both FMUs.
-memcheck: build
-	PYTHONPATH=tests/support $(PYTHON) tests/support/c_host.py examples/paper.toml
+memcheck: build $(VENV)/ready
+	PYTHONPATH=tests/support $(IN_VENV)python tests/support/c_host.py examples/paper.toml
 
 lint: $(VENV)/ready
 	cargo fmt --all --check

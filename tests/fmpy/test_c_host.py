@@ -4,9 +4,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-import pytest
-
 import c_host
+import pytest
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -20,9 +19,9 @@ if TYPE_CHECKING:
 def test_every_life_of_an_instance(
     tmp_path: Path, example_case: Callable[[str], Case], which: str, start: float
 ) -> None:
-    """Saved, restored, reset, doubled, unloaded and loaded again, the FMU gives the same bits, whatever the start time."""
+    """Saved, restored, reset, doubled, unloaded and loaded again: the same bits, whatever the start time."""
     fmu = getattr(example_case("paper").fmus, which)
     program = c_host.build(tmp_path)
-    lines = c_host.drive(program, fmu, start=start, under=[]).splitlines()
+    lines = c_host.drive(program, fmu, start=start).splitlines()
     assert len(lines) == 400
-    assert lines == c_host.drive(program, fmu, start=0.0, under=[]).splitlines()
+    assert lines == c_host.drive(program, fmu, start=0.0).splitlines()

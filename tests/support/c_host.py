@@ -5,14 +5,14 @@ from __future__ import annotations
 import subprocess
 import sys
 import tempfile
-import zipfile
 from pathlib import Path
-from xml.etree import ElementTree as ET
+
+import fmpy
 
 import commands
 
 SOURCE = commands.ROOT / "tests" / "c" / "drive.c"
-VALGRIND = ["valgrind", "--quiet", "--error-exitcode=9", "--leak-check=full", "--show-leak-kinds=all"]
+VALGRIND = ("valgrind", "--quiet", "--error-exitcode=9", "--leak-check=full", "--show-leak-kinds=all")
 
 
 def build(folder: Path) -> Path:
@@ -23,31 +23,28 @@ def build(folder: Path) -> Path:
     return program
 
 
-def drive(program: Path, fmu: Path, *, start: float = 0.0, step: float = 0.5, count: int = 400, under: list[str]) -> str:
-    """Drives an FMU: all its Real inputs and outputs, `count` steps of `step` sample times.
+def drive(program: Path, fmu: Path, *, start: float = 0.0, count: int = 400, under: tuple[str, ...] = ()) -> str:
+    """Drives an FMU with all its Real inputs and outputs, `count` steps of half a sample time.
 
     Returns:
         What the program prints: the outputs after each step, in C's hexadecimal notation.
     """
     with tempfile.TemporaryDirectory() as unpacked:
-        with zipfile.ZipFile(fmu) as archive:
-            archive.extractall(unpacked)
-        root = ET.parse(Path(unpacked, "modelDescription.xml")).getroot()
-        period = float(root.find("DefaultExperiment").get("stepSize"))
-        identifier = root.find("CoSimulation").get("modelIdentifier")
-        library = Path(unpacked, "binaries", "linux64", f"{identifier}.so")
+        fmpy.extract(fmu, unpacked)
+        description = fmpy.read_model_description(unpacked)
+        library = Path(unpacked, "binaries", "linux64", f"{description.coSimulation.modelIdentifier}.so")
         arguments = []
-        for variable in root.find("ModelVariables"):
-            reference, name = variable.get("valueReference"), variable.get("name")
-            if variable.find("Real") is None or name.startswith("mode"):
+        for variable in description.modelVariables:
+            reference = variable.valueReference
+            if variable.type != "Real" or variable.name.startswith("mode"):
                 continue
-            if variable.get("causality") == "input":
-                arguments += ["i", reference, str(0.001 * (1 + int(reference)))]
-            elif variable.get("causality") == "output":
-                arguments += ["o", reference]
-        resources = Path(unpacked, "resources").as_uri()
-        numbers = [repr(start), repr(step * period), str(count)]
-        command = [*under, program, library, root.get("guid"), resources, *numbers, *arguments]
+            if variable.causality == "input":
+                arguments += ["i", str(reference), str(0.001 * (1 + reference))]
+            elif variable.causality == "output":
+                arguments += ["o", str(reference)]
+        step = 0.5 * description.defaultExperiment.stepSize
+        plan = [description.guid, Path(unpacked, "resources").as_uri(), repr(start), repr(step), str(count)]
+        command = [*under, program, library, *plan, *arguments]
         return subprocess.run(command, check=True, stdout=subprocess.PIPE, text=True).stdout
 
 

@@ -1,5 +1,7 @@
 //! What the targets share: an importer out of its mind.
 
+pub mod design;
+
 use fmu_host::types::*;
 use fmu_host::{Functions, Instance};
 use libfuzzer_sys::arbitrary::{self, Arbitrary};
@@ -80,7 +82,13 @@ fn values(given: &[f64], count: usize) -> Vec<f64> {
     values
 }
 
-/// Plays the calls on an instance.
+/// Makes a used instance as good as a fresh one, whatever state it is in.
+pub fn fresh(it: &Instance) {
+    it.messages.lock().unwrap().clear();
+    assert_eq!(it.reset(), Status::Ok, "{}", it.last_message());
+}
+
+/// Plays the calls on an instance, and frees the states that are left.
 pub fn play(it: &Instance, calls: &[Call]) {
     let mut player = Player {
         c: it.c,
@@ -90,6 +98,9 @@ pub fn play(it: &Instance, calls: &[Call]) {
     };
     for call in calls {
         assert_ne!(player.play(call), Status::Fatal, "{}", it.last_message());
+    }
+    while let Some(last) = player.saved.len().checked_sub(1) {
+        assert_eq!(player.forget_at(last), Status::Ok, "{}", it.last_message());
     }
 }
 
@@ -251,6 +262,12 @@ impl Player {
             self.saved.retain(|(saved, _)| *saved != known);
         }
         status
+    }
+
+    fn forget_at(&mut self, at: usize) -> Status {
+        let (mut state, _) = self.saved.remove(at);
+        // SAFETY: a good place for the state.
+        unsafe { (self.f.free_fmu_state)(self.c, &mut state) }
     }
 
     fn bytes(&mut self, which: u8, damage: Option<(usize, u8)>, wrong: usize) -> Status {

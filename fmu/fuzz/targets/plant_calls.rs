@@ -2,16 +2,19 @@
 
 #![no_main]
 
-use fmu_fuzz::{Call, play};
+use fmu_fuzz::{Call, fresh, play};
 use fmu_host::model::example;
 use fmu_host::{Instance, Model};
 use ftc_plant as _;
 use libfuzzer_sys::fuzz_target;
-use std::sync::LazyLock;
 
-static MODEL: LazyLock<Model> = LazyLock::new(|| Model::plant(&example()));
+thread_local! {
+    /// Made once: loading a design takes longer than most sequences.
+    static INSTANCE: Instance =
+        Instance::new(fmu_host::linked!(), &Model::plant(&example())).unwrap();
+}
 
-fuzz_target!(|calls: Vec<Call>| {
-    let it = Instance::new(fmu_host::linked!(), &MODEL).unwrap();
-    play(&it, &calls);
-});
+fuzz_target!(|calls: Vec<Call>| INSTANCE.with(|it| {
+    fresh(it);
+    play(it, &calls);
+}));

@@ -2,7 +2,7 @@
 
 #![no_main]
 
-use fmu_fuzz::{Call, play};
+use fmu_fuzz::{Call, fresh, play};
 use fmu_host::model::example;
 use fmu_host::types::Status;
 use fmu_host::{Instance, Model};
@@ -10,11 +10,15 @@ use ftc_controller as _;
 use libfuzzer_sys::fuzz_target;
 use std::sync::LazyLock;
 
-static MODEL: LazyLock<Model> = LazyLock::new(|| Model::controller(&example()));
+thread_local! {
+    static INSTANCE: Instance =
+        Instance::new(fmu_host::linked!(), &Model::controller(&example())).unwrap();
+}
 
 /// Honest bytes after some ticks.
 static HONEST: LazyLock<Vec<u8>> = LazyLock::new(|| {
-    let it = Instance::new(fmu_host::linked!(), &MODEL).unwrap();
+    let model = Model::controller(&example());
+    let it = Instance::new(fmu_host::linked!(), &model).unwrap();
     it.initialize(0.0, |_| ());
     for k in 0..50 {
         assert_eq!(it.step(f64::from(k), 1.0), Status::Ok);
@@ -32,10 +36,14 @@ fuzz_target!(|input: (Vec<(u16, u8)>, Option<u16>, Vec<Call>)| {
     bytes.truncate(length.map_or(usize::MAX, usize::from));
     let checksum = crc32fast::hash(&bytes);
     bytes.extend(checksum.to_le_bytes());
-    let it = Instance::new(fmu_host::linked!(), &MODEL).unwrap();
-    let state = it.read_bytes(&bytes);
-    if !state.is_null() {
-        assert_eq!(it.restore(state), Status::Ok);
-        play(&it, &calls);
-    }
+    INSTANCE.with(|it| {
+        fresh(it);
+        let mut state = it.read_bytes(&bytes);
+        if !state.is_null() {
+            assert_eq!(it.restore(state), Status::Ok);
+            play(it, &calls);
+            // SAFETY: a good place for the state, which is known.
+            unsafe { (it.functions().free_fmu_state)(it.c, &mut state) };
+        }
+    });
 });

@@ -1,13 +1,8 @@
 //! Designs that somebody forged: numbers exchanged, text damaged, the guid made to fit.
 
-#![no_main]
-
 use fmu_abi::{Slave, Values};
 use fmu_host::model::example;
-use ftc_controller::ControllerFmu;
-use ftc_plant::PlantFmu;
 use libfuzzer_sys::arbitrary::{self, Arbitrary};
-use libfuzzer_sys::fuzz_target;
 use std::path::Path;
 use std::sync::LazyLock;
 
@@ -20,8 +15,8 @@ static FOLDER: LazyLock<String> = LazyLock::new(|| {
 });
 
 /// What is done to the text.
-#[derive(Arbitrary, Debug)]
-enum Edit {
+#[derive(Arbitrary, Clone, Debug)]
+pub enum Edit {
     /// The number at this place (of all numbers) becomes another.
     Number(u16, i16),
     /// The same, with a number of any size.
@@ -94,12 +89,12 @@ fn run<S: Slave>(identifier: &str, bytes: &[u8]) {
     assert!(slave.fits(&state));
 }
 
-fuzz_target!(|edits: Vec<Edit>| {
+/// Forges a design and hands it to a slave, whose binary is called `identifier`.
+pub fn forge<S: Slave>(identifier: &str, edits: &[Edit]) {
     let mut text = HONEST.clone();
     for change in edits.iter().take(8) {
         edit(&mut text, change);
     }
     std::fs::write(Path::new(&*FOLDER).join("design.json"), &text).unwrap();
-    run::<ControllerFmu>("ftc_controller", text.as_bytes());
-    run::<PlantFmu>("ftc_plant", text.as_bytes());
-});
+    run::<S>(identifier, text.as_bytes());
+}
