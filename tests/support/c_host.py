@@ -42,7 +42,7 @@ def drive(program: Path, fmu: Path, *, start: float = 0.0, count: int = 400, und
                 arguments += ["i", str(reference), str(0.001 * (1 + reference))]
             elif variable.causality == "output":
                 arguments += ["o", str(reference)]
-        step = 0.5 * description.defaultExperiment.stepSize
+        step = 0.5 * float(description.defaultExperiment.stepSize)
         plan = [description.guid, Path(unpacked, "resources").as_uri(), repr(start), repr(step), str(count)]
         command = [*under, program, library, *plan, *arguments]
         return subprocess.run(command, check=True, stdout=subprocess.PIPE, text=True).stdout

@@ -2,8 +2,8 @@
 
 #![no_main]
 
-use fmu_fuzz::{Call, fresh, play};
 use fmu_host::model::example;
+use fmu_host::random_calls::{Call, fresh, play};
 use fmu_host::types::Status;
 use fmu_host::{Instance, Model};
 use ftc_controller as _;

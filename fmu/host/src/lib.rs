@@ -9,6 +9,7 @@ mod exercise;
 mod functions;
 mod instance;
 pub mod model;
+pub mod random_calls;
 
 pub use closed_loop::{Coupling, Loop};
 pub use counting::{Counting, allocations};

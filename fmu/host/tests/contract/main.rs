@@ -4,6 +4,7 @@
 
 mod derivatives;
 mod inputs;
+mod random_calls;
 mod resources;
 mod states;
 mod threads;
