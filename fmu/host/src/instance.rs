@@ -216,6 +216,10 @@ impl Instance {
     }
 
     /// Restores a state.
+    #[allow(
+        clippy::not_unsafe_ptr_arg_deref,
+        reason = "unknown states are refused, never followed"
+    )]
     pub fn restore(&self, state: Pointer) -> Status {
         // SAFETY: unknown states are refused.
         unsafe { (self.functions.set_fmu_state)(self.c, state) }
