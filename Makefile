@@ -10,7 +10,7 @@ IN_VENV := $(VENV)/bin/
 build:
 	cargo build --release --workspace
 
-test: test-rust test-python
+test: lint test-rust test-python
 
 # In release mode: the design's optimisation problems are solved many times over, and the Python
 # tests need the release binaries anyway.

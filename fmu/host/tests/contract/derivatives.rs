@@ -55,7 +55,7 @@ fn agree(it: &Instance, input: &str, changes: &[f64], outputs: &[&str], time: f6
 
 #[test]
 fn derivatives_are_those_of_the_next_tick() {
-    let pair = Pair::new();
+    let pair = Pair::load();
     let mut closed = pair.close(0.0);
     for k in 0..420 {
         let time = f64::from(k);
@@ -93,7 +93,7 @@ fn derivatives_are_those_of_the_next_tick() {
 
 #[test]
 fn derivatives_in_initialization_mode_are_those_of_the_first_outputs() {
-    let pair = Pair::new();
+    let pair = Pair::load();
     let plant = pair.fresh(1);
     plant.enter(0.0);
     let mut out = [f64::NAN; 2];

@@ -37,7 +37,7 @@ fn refused(it: &Instance, spoil: impl Fn(&Instance), mend: impl Fn(&Instance), w
 
 #[test]
 fn a_measurement_that_is_no_number_is_a_fault() {
-    let pair = Pair::new();
+    let pair = Pair::load();
     for lost in [f64::NAN, f64::INFINITY, f64::NEG_INFINITY] {
         let mut closed = running(&pair);
         let (y, flags) = (closed.controller.span("y"), closed.controller.span("fault"));
@@ -63,7 +63,7 @@ fn a_measurement_that_is_no_number_is_a_fault() {
 
 #[test]
 fn a_reference_that_is_no_number_is_refused_by_name() {
-    let pair = Pair::new();
+    let pair = Pair::load();
     let closed = running(&pair);
     closed.sense();
     let it = &closed.controller;
@@ -83,7 +83,7 @@ fn a_reference_that_is_no_number_is_refused_by_name() {
 
 #[test]
 fn a_command_that_is_no_number_is_refused_by_name() {
-    let pair = Pair::new();
+    let pair = Pair::load();
     let closed = running(&pair);
     let good = closed.plant.get("u");
     let span = closed.plant.span("u");
@@ -94,7 +94,7 @@ fn a_command_that_is_no_number_is_refused_by_name() {
 
 #[test]
 fn a_mode_that_is_none_is_refused_by_name() {
-    let pair = Pair::new();
+    let pair = Pair::load();
     let closed = running(&pair);
     closed.sense();
     let it = &closed.controller;
@@ -118,7 +118,7 @@ fn a_mode_that_is_none_is_refused_by_name() {
 
 #[test]
 fn the_mode_may_come_as_a_real() {
-    let pair = Pair::new();
+    let pair = Pair::load();
     let (mut closed, mut other) = (pair.close(0.0), pair.close(0.0));
     let [from, to] = [
         other.plant.span("mode_real"),

@@ -20,7 +20,7 @@ pub struct Pair {
 }
 
 impl Pair {
-    pub fn new() -> Self {
+    pub fn load() -> Self {
         let design = example();
         Self {
             libraries: [Library::load("ftc_controller"), Library::load("ftc_plant")],

@@ -35,7 +35,7 @@ fn design(model: &Model) -> Vec<u8> {
 
 #[test]
 fn missing_empty_truncated_and_damaged_designs_are_refused() {
-    let pair = Pair::new();
+    let pair = Pair::load();
     for which in [0, 1] {
         let good = design(&pair.models[which]);
         assert!(refusal(&pair, which, None).contains("cannot read"));
@@ -55,7 +55,7 @@ fn missing_empty_truncated_and_damaged_designs_are_refused() {
 /// A design that fits its guid, as somebody who forges both could make it.
 #[test]
 fn designs_of_another_layout_or_of_other_sizes_are_refused() {
-    let pair = Pair::new();
+    let pair = Pair::load();
     let text = String::from_utf8(design(&pair.models[0])).unwrap();
     let forgeries = [
         text.replacen("\"format\":1", "\"format\":2", 1),
@@ -86,7 +86,7 @@ fn designs_of_another_layout_or_of_other_sizes_are_refused() {
 /// A zip made by hand: the XML of one FMU, the binary of the other, one design.
 #[test]
 fn the_binary_of_another_fmu_is_refused() {
-    let pair = Pair::new();
+    let pair = Pair::load();
     let [controller, plant] = pair.functions();
     for (functions, model) in [(plant, &pair.models[0]), (controller, &pair.models[1])] {
         let message = sentence(Instance::new(functions, model));

@@ -15,7 +15,7 @@ fn run(closed: &mut Loop, from: usize, to: usize) -> Vec<Vec<u64>> {
 
 #[test]
 fn rollback_gives_the_same_bits_at_every_stage_of_the_experiment() {
-    let pair = Pair::new();
+    let pair = Pair::load();
     let mut closed = pair.close(0.0);
     // Before, within and after the first fault, and across the switch of modes.
     for (from, to) in [
@@ -46,7 +46,7 @@ fn rollback_gives_the_same_bits_at_every_stage_of_the_experiment() {
 
 #[test]
 fn bytes_go_on_in_another_instance() {
-    let pair = Pair::new();
+    let pair = Pair::load();
     let (mut closed, mut other) = (pair.close(0.0), pair.close(0.0));
     run(&mut closed, 0, 150);
     for (from, to) in [
@@ -61,7 +61,7 @@ fn bytes_go_on_in_another_instance() {
 
 #[test]
 fn reset_equals_a_fresh_instance() {
-    let pair = Pair::new();
+    let pair = Pair::load();
     let mut closed = pair.close(0.0);
     let fresh = [pair.fresh(0).bytes(), pair.fresh(1).bytes()];
     let first = run(&mut closed, 0, 500);
@@ -75,7 +75,7 @@ fn reset_equals_a_fresh_instance() {
 
 #[test]
 fn damaged_and_foreign_bytes_are_refused() {
-    let pair = Pair::new();
+    let pair = Pair::load();
     let mut closed = pair.close(0.0);
     run(&mut closed, 0, 5);
     let (controller, plant) = (&closed.controller, &closed.plant);

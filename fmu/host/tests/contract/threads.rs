@@ -16,7 +16,7 @@ fn run(closed: &mut Loop) -> Vec<Vec<u64>> {
 /// 100 instances, half of them controllers, in 8 threads, their steps interleaved.
 #[test]
 fn a_hundred_instances_in_eight_threads_do_not_know_of_each_other() {
-    let pair = Pair::new();
+    let pair = Pair::load();
     let expected = run(&mut pair.close(0.0));
     thread::scope(|scope| {
         for number in 0..8 {
@@ -37,7 +37,7 @@ fn a_hundred_instances_in_eight_threads_do_not_know_of_each_other() {
 
 #[test]
 fn an_instance_may_change_its_thread() {
-    let pair = Pair::new();
+    let pair = Pair::load();
     let expected = run(&mut pair.close(0.0));
     let mut closed = pair.close(0.0);
     for (k, expected) in (0..300).zip(expected) {
@@ -52,7 +52,7 @@ fn an_instance_may_change_its_thread() {
 
 #[test]
 fn a_library_is_unloaded_and_loaded_again() {
-    let pair = Pair::new();
+    let pair = Pair::load();
     let mut closed = pair.close(0.0);
     let first = run(&mut closed);
     drop(closed);
@@ -60,7 +60,7 @@ fn a_library_is_unloaded_and_loaded_again() {
     libraries.into_iter().for_each(fmu_host::Library::unload);
     let again = Pair {
         models,
-        ..Pair::new()
+        ..Pair::load()
     };
     assert_eq!(run(&mut again.close(0.0)), first);
 }

@@ -36,7 +36,7 @@ fn whole(_: usize) -> Vec<f64> {
 
 #[test]
 fn the_loop_is_the_native_loop_bit_for_bit() {
-    let pair = Pair::new();
+    let pair = Pair::load();
     let mut closed = pair.close(0.0);
     for (k, (y, u)) in native(&example(), 1600).into_iter().enumerate() {
         let bits = |values: &[f64]| values.iter().map(|v| v.to_bits()).collect::<Vec<_>>();
@@ -48,7 +48,7 @@ fn the_loop_is_the_native_loop_bit_for_bit() {
 
 #[test]
 fn steps_within_a_sample_change_nothing() {
-    let pair = Pair::new();
+    let pair = Pair::load();
     for coupling in [GaussSeidel, Jacobi] {
         let regular = bits(&pair, 0.0, coupling, whole);
         let sevenths = |_| (1..=7).map(|part| f64::from(part) / 7.0).collect();
@@ -68,7 +68,7 @@ fn steps_within_a_sample_change_nothing() {
 
 #[test]
 fn the_start_time_changes_nothing() {
-    let pair = Pair::new();
+    let pair = Pair::load();
     let regular = bits(&pair, 0.0, GaussSeidel, whole);
     for start in STARTS {
         assert_eq!(bits(&pair, start, GaussSeidel, whole), regular, "{start}");
@@ -80,7 +80,7 @@ fn the_start_time_changes_nothing() {
 /// A step of 3.5 samples holds the inputs of its beginning, as short ones without exchange do.
 #[test]
 fn a_long_step_is_as_many_short_ones() {
-    let pair = Pair::new();
+    let pair = Pair::load();
     for start in STARTS {
         let (mut long, mut short) = (pair.close(start), pair.close(start));
         for k in 0..120 {
@@ -98,7 +98,7 @@ fn a_long_step_is_as_many_short_ones() {
 /// With the controller first, the plant gets what the controller says at the end of its step.
 #[test]
 fn a_long_step_of_one_instance_is_as_many_short_ones() {
-    let pair = Pair::new();
+    let pair = Pair::load();
     let (mut long, short) = (pair.close(1e9), pair.close(1e9));
     for k in 0..120 {
         let begin = 1e9 + 3.5 * TE * f64::from(k);
