@@ -96,7 +96,7 @@ fn damaged_and_foreign_bytes_are_refused() {
 /// "fatal" was taken, and then nothing could be done with the instance any more.
 #[test]
 fn forged_phases_and_sizes_are_refused() {
-    let pair = Pair::new();
+    let pair = Pair::load();
     let mut closed = pair.close(0.0);
     run(&mut closed, 0, 5);
     for (it, model) in [&closed.controller, &closed.plant]
@@ -121,8 +121,9 @@ fn forged_phases_and_sizes_are_refused() {
             assert!(read(phase, never).is_null(), "phase {never}");
         }
         // Whatever byte is forged: refused, or as good as any state.
-        for at in 8..bytes.len() - 4 {
-            let state = read(at, bytes[at] ^ 0x55);
+        let body = &bytes[..bytes.len() - 4];
+        for (at, byte) in body.iter().enumerate().skip(8) {
+            let state = read(at, byte ^ 0x55);
             if !state.is_null() {
                 assert_eq!(it.restore(state), Status::Ok);
                 assert_eq!(it.reset(), Status::Ok, "byte {at}");
