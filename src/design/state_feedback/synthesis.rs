@@ -217,7 +217,7 @@ impl Road<'_> {
                 .collect(),
             modes: parts
                 .iter()
-                .map(|part| physical_gains(&part.gain, &self.units, spec.latency))
+                .map(|part| physical_gains(&part.gain, &self.units, spec))
                 .collect(),
             gamma,
             optimum,
@@ -263,13 +263,9 @@ impl Levels {
 }
 
 /// Splits `K~ = [K, K_u, G]` and undoes the scaling; exact, since the units are powers of two.
-fn physical_gains(gain: &DMatrix<f64>, units: &Units, latency: usize) -> ModeGains {
-    let (n, m, r) = (
-        units.states.len(),
-        units.inputs.len(),
-        units.integrators.len(),
-    );
-    let previous = latency * m;
+fn physical_gains(gain: &DMatrix<f64>, units: &Units, spec: &ControlSpec) -> ModeGains {
+    let (n, m) = (units.states.len(), units.inputs.len());
+    let previous = spec.latency * m;
     let inverse = |values: &[f64]| values.iter().map(|v| 1.0 / v).collect::<Vec<_>>();
     let outward = inverse(&units.inputs);
     let part = |first: usize, units: &[f64]| {
@@ -279,6 +275,6 @@ fn physical_gains(gain: &DMatrix<f64>, units: &Units, latency: usize) -> ModeGai
     ModeGains {
         state_feedback: part(0, &units.states),
         previous_input: part(n, &units.inputs[..previous]),
-        integral: part(n + previous, &units.integrators[..r]),
+        integral: part(n + previous, &units.integral_part(spec)),
     }
 }
