@@ -12,7 +12,6 @@ mod export;
 mod failure;
 mod output;
 mod progress;
-#[allow(dead_code)]
 mod report;
 mod simulate;
 mod summary;
