@@ -15,8 +15,8 @@ use ftc::design::assembly::{DatabaseSource, EstimatorSpec, KnownDisturbance, Req
 use ftc::design::{ControlSpec, Lyapunov, Objective, ObserverSpec, Signal, Signals};
 use ftc::plant::{Dimensions, Mode, OperatingPoint, SwitchedPlant};
 use ftc::rows;
-use ftc::simulate::{Scenario, Truth};
 use ftc::simulate::scenario::{ModeInterval, Waveform};
+use ftc::simulate::{Scenario, Truth};
 use nalgebra::DMatrix;
 use std::path::Path;
 

@@ -290,7 +290,13 @@ impl Record {
     }
 
     /// The run of a contender in the scenario whose curves are drawn.
-    fn run(&self, channel: &str, reference: &str, noise: f64, contender: Contender) -> Option<&Run> {
+    fn run(
+        &self,
+        channel: &str,
+        reference: &str,
+        noise: f64,
+        contender: Contender,
+    ) -> Option<&Run> {
         self.runs.iter().find(|run| {
             (run.channel, run.reference, run.controller) == (channel, reference, contender)
                 && run.noise == noise

@@ -12,15 +12,15 @@ use crate::reproduce::experiment::{curve, figure, reference, series};
 /// Everything, the verdicts first.
 pub fn page(record: &Record, claims: &Claims) -> Page {
     let mut sections = vec![
-        Section::new("What the paper says, what is found, and why").with(Block::Table(said(claims))),
+        Section::new("What the paper says, what is found, and why")
+            .with(Block::Table(said(claims))),
     ];
     sections.extend(record.shown.as_ref().map(shown));
     sections.push(
-        Section::new("Which references reach the reported figures").with(Block::Table(reach(record))),
+        Section::new("Which references reach the reported figures")
+            .with(Block::Table(reach(record))),
     );
-    sections.push(
-        runs(record).with(Block::Table(contenders())),
-    );
+    sections.push(runs(record).with(Block::Table(contenders())));
     Page {
         title: "The paper’s example, reproduced".into(),
         lead: format!(
@@ -29,7 +29,11 @@ pub fn page(record: &Record, claims: &Claims) -> Page {
              The method works, but not as printed: with sound inequalities and a healthy database its true mean square error \
              is at most {} times that of a controller told the fault, in all {} runs.",
             aligned(record.worst_over_told(Contender::Proposed), 3),
-            record.runs.iter().filter(|r| r.controller == Contender::Proposed).count()
+            record
+                .runs
+                .iter()
+                .filter(|r| r.controller == Contender::Proposed)
+                .count()
         ),
         key_numbers: key_numbers(record, claims),
         sections,
@@ -49,11 +53,17 @@ fn key_numbers(record: &Record, claims: &Claims) -> Vec<KeyNumber> {
     let infeasible = claims.theorems.iter().filter(|t| !t.feasible).count();
     vec![
         key(
-            format!("{} ×", aligned(record.worst_over_told(Contender::Proposed), 3)),
+            format!(
+                "{} ×",
+                aligned(record.worst_over_told(Contender::Proposed), 3)
+            ),
             "the true error of a controller told the fault: proposed FTC, worst of all runs",
         ),
         key(
-            format!("{} ×", number(record.best_over_told(Contender::AdditiveSliding))),
+            format!(
+                "{} ×",
+                number(record.best_over_told(Contender::AdditiveSliding))
+            ),
             "the same for additive FTC as printed, best of all runs",
         ),
         key(
@@ -93,8 +103,12 @@ fn said(claims: &Claims) -> Table {
 
 /// The figures that correspond to the paper's 2 to 6.
 fn shown(shown: &Shown) -> Section {
-    let outputs = (0..2).filter_map(|output| response(shown, output)).collect();
-    let faults = (0..2).filter_map(|sensor| estimate(shown, sensor)).collect();
+    let outputs = (0..2)
+        .filter_map(|output| response(shown, output))
+        .collect();
+    let faults = (0..2)
+        .filter_map(|sensor| estimate(shown, sensor))
+        .collect();
     let inputs = (0..2).filter_map(|input| command(shown, input)).collect();
     Section::new("Figures 2 to 6")
         .paragraph(
@@ -158,7 +172,14 @@ fn estimate(shown: &Shown, sensor: usize) -> Option<Figure> {
                     .weight(Weight::Broad)
                     .step(),
             )
-            .with(series("sliding window, printed", Contender::AdditiveSliding.variant(), printed).step())
+            .with(
+                series(
+                    "sliding window, printed",
+                    Contender::AdditiveSliding.variant(),
+                    printed,
+                )
+                .step(),
+            )
             .with(Series::new("reference window", found).step()),
     )
 }

@@ -95,7 +95,12 @@ pub fn doubled_disturbance() -> Result<DoubledDisturbance, String> {
         let (n, s) = mode.e.shape();
         let silent = DMatrix::zeros(n, s);
         let beside = |left: &DMatrix<f64>, right: &DMatrix<f64>| {
-            DMatrix::from_columns(&left.column_iter().chain(right.column_iter()).collect::<Vec<_>>())
+            DMatrix::from_columns(
+                &left
+                    .column_iter()
+                    .chain(right.column_iter())
+                    .collect::<Vec<_>>(),
+            )
         };
         Mode {
             e: beside(&mode.e, &silent),

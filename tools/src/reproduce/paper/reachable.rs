@@ -104,7 +104,10 @@ impl Reference {
 
 /// The reference of each tracked output over time.
 pub fn signals(run: &Trajectory) -> Vec<Vec<f64>> {
-    let size = run.records.first().map_or(0, |record| record.reference.len());
+    let size = run
+        .records
+        .first()
+        .map_or(0, |record| record.reference.len());
     let signal = |index: usize| run.records.iter().map(|r| r.reference[index]).collect();
     (0..size).map(signal).collect()
 }
