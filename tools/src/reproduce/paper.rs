@@ -68,9 +68,9 @@ impl Contender {
         match self {
             Self::Proposed => "proposed FTC",
             Self::ToldTheFault => "told the fault",
-            Self::PrintedCompensation => "proposed, compensation printed",
-            Self::AdditiveReference => "additive FTC, reference window",
-            Self::AdditiveSliding => "additive FTC, all as printed",
+            Self::PrintedCompensation => "proposed, (38) printed",
+            Self::AdditiveReference => "additive, reference",
+            Self::AdditiveSliding => "additive, as printed",
             Self::NoFtc => "without FTC",
         }
     }

@@ -358,7 +358,10 @@ fn all(trials: &[Trial]) -> Table {
     let mut rows = Vec::new();
     for trial in trials {
         for (place, variant) in CONTENDERS.into_iter().enumerate() {
-            let title = format!("{} {}", sensor_name(trial), trial.case.words);
+            let title = match trial.case.fault {
+                None => trial.case.words.clone(),
+                Some(_) => format!("{}: {}", sensor_name(trial), trial.case.words),
+            };
             let mut cells = vec![if place == 0 { title } else { String::new() }];
             cells.push(name(variant).into());
             let outputs = trial.outputs(variant);
@@ -376,7 +379,7 @@ fn all(trials: &[Trial]) -> Table {
     Table {
         caption: "Both outputs under every fault; MSE in V² and A²".into(),
         columns: vec![
-            Column::name("fault"),
+            Column::words("fault"),
             Column::name("controller"),
             Column::number("true MSE v"),
             Column::number("i"),

@@ -155,7 +155,7 @@ impl Claims {
                 "both at once need var(y) ≤ {}. At least as good in both: {}; out of reach of every controller: {}",
                 aligned(self.largest_variance, 3),
                 names(&|r| r.reached()),
-                names(&|r| !r.error_possible() || r.variance == 0.0),
+                names(&|r| !r.error_possible() || r.is_constant()),
             ),
             "var(e) ≤ MSE, so var(y) = var(e) / (1 − VAF) is bounded. A jump of height h costs h²/N of MSE in \
              the one sample the plant needs; about a constant reference VAF is 0 by definition",

@@ -32,6 +32,9 @@ pub struct Reference {
     pub proposed: Merit,
 }
 
+/// A variance below this is rounding: the references are of the order of one.
+const NO_VARIANCE: f64 = 1e-12;
+
 impl Reference {
     /// Takes the first output of the runs without noise.
     pub fn new(
@@ -62,6 +65,11 @@ impl Reference {
         }
     }
 
+    /// Whether it stays where it is.
+    pub fn is_constant(&self) -> bool {
+        self.variance < NO_VARIANCE
+    }
+
     /// Whether some causal controller may reach the reported error.
     pub fn error_possible(&self) -> bool {
         self.deadbeat.mse <= REPORTED.mse
@@ -80,7 +88,7 @@ impl Reference {
     /// What holds for it, in a sentence.
     pub fn verdict(&self) -> String {
         let both = match (self.error_possible(), self.vaf_possible()) {
-            _ if self.variance == 0.0 => {
+            _ if self.is_constant() => {
                 "the error is possible, the VAF is 0 with every controller: about a constant reference \
                  the error varies exactly as the output does"
             }
