@@ -82,7 +82,9 @@ fn every_kind_at_every_time_on_either_sensor_or_both() {
                 let tolerant = simulate(&events, Variant::Ftc);
                 let off = distance(&tolerant, &healthy, judged);
                 let believing = distance(&simulate(&events, Variant::NoFtc), &healthy, judged);
-                println!("{name} {when} on {sensors:?}: off by {off:.3}, without FTC by {believing:.3}");
+                println!(
+                    "{name} {when} on {sensors:?}: off by {off:.3}, without FTC by {believing:.3}"
+                );
                 assert!(off < CLOSE, "{name} {when} on {sensors:?}: off by {off:.3}");
                 let finite = tolerant.records.iter().all(|r| {
                     r.u.iter()

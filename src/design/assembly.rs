@@ -175,7 +175,11 @@ fn limits(inputs: &[Signal]) -> Vec<Limits> {
 
 /// The certified gains as the controller runs them. What saturation takes off an input unwinds
 /// the integral by half of what would undo it; inputs without a limit never saturate.
-pub(crate) fn feedback(control: &super::StateFeedback, bumpless: bool, limits: &[Limits]) -> StateFeedback {
+pub(crate) fn feedback(
+    control: &super::StateFeedback,
+    bumpless: bool,
+    limits: &[Limits],
+) -> StateFeedback {
     let mut feedback = control.for_controller();
     feedback.bumpless = bumpless;
     for gains in &mut feedback.modes {
