@@ -9,6 +9,7 @@
 
 mod as_printed;
 mod assemble;
+mod baselines;
 mod certificate;
 mod design_file;
 mod export;
@@ -107,6 +108,11 @@ enum Command {
         /// Directory to write to; made if it does not exist.
         #[arg(long, value_name = "DIR")]
         out: PathBuf,
+        /// Run two more: the paper's additive fault-tolerant control with gains that only decay
+        /// (additive) and model predictive control without fault estimation (mpc); and give the
+        /// bound that no causal controller beats (deadbeat_bound).
+        #[arg(long)]
+        baselines: bool,
     },
 }
 
@@ -154,11 +160,15 @@ fn run(arguments: &Arguments) -> Result<String, Failure> {
             let design = solve(design, &progress)?;
             export::write(&design, staging).map_err(Failure::Input)
         }
-        Command::Simulate { design, out } => {
+        Command::Simulate {
+            design,
+            out,
+            baselines,
+        } => {
             let staging = output::Staging::new(out).map_err(Failure::Input)?;
             let design = solve(design, &progress)?;
             progress.tell("simulating");
-            simulate::write(&design, staging).map_err(Failure::Input)
+            simulate::write(&design, *baselines, staging).map_err(Failure::Input)
         }
     }
 }
