@@ -483,10 +483,9 @@ fn database(given: &schema::Estimator, logs: &Logs) -> Result<DatabaseSource, St
         Some(NameOrList::Name(name)) if name == "model" => return Ok(DatabaseSource::Model),
         Some(NameOrList::Name(name)) if !is_log(name) => {
             return Err(format!(
-                "estimator.database = \"{}\" is not a known value: {}, or name a CSV file",
+                "estimator.database = \"{}\" is not a known value and no CSV file: {}",
                 crate::design_file::sentence::shorten(name),
                 crate::design_file::suggest::nearest(name, &["commission", "model"])
-                    .trim_end_matches('?')
             ));
         }
         Some(files) => files,
