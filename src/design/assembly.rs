@@ -1,6 +1,6 @@
 //! From what is asked for to a finished design: gains, observer, predictor, thresholds, record.
 
-use super::commissioning::{self, LONGEST_RESPONSE};
+use super::commissioning::{self, Database, LONGEST_RESPONSE, RecordedDisturbance};
 use super::harmonics;
 use super::{
     ControlSpec, Design, DesignError, FORMAT, ObserverSpec, Signal, Signals, check_controllable,
@@ -21,8 +21,10 @@ pub struct Request {
     pub name: String,
     /// What the signals are called and measured in.
     pub signals: Signals,
-    /// The plant.
+    /// The plant as it is designed for.
     pub plant: SwitchedPlant,
+    /// What the simulated plant really is.
+    pub truth: Truth,
     /// The state feedback that is asked for.
     pub control: ControlSpec,
     /// Whether a mode switch leaves the command where it was.
@@ -57,12 +59,14 @@ pub struct EstimatorSpec {
 }
 
 /// Where the healthy database comes from.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq)]
 pub enum DatabaseSource {
     /// A commissioning run on the plant model.
     Commission,
     /// The model's own Markov parameters.
     Model,
+    /// Logs of healthy operation: for each mode, the stretches in which it was active.
+    Recorded(Vec<Vec<Database>>),
 }
 
 /// How thresholds are chosen.
@@ -107,6 +111,12 @@ const LARGEST_FAULT: f64 = 1e6;
 /// Seed of the commissioning run; any will do, but the same design must give the same bytes.
 const COMMISSIONING_SEED: u64 = 20;
 
+/// Least ratio of the weakest to the strongest excited direction of a recorded database.
+const LEAST_EXCITATION: f64 = 1e-4;
+
+/// The most entries of the least-squares problem of one mode: beyond it memory runs short.
+const MOST_REGRESSORS: usize = 20_000_000;
+
 /// Samples a sliding window holds beyond those its own inputs can explain.
 const WINDOW_MARGIN: usize = 20;
 
@@ -129,7 +139,12 @@ pub fn assemble(request: Request) -> Result<Design, DesignError> {
         &scaling,
     )?;
     let input_limits = limits(&request.signals.inputs);
-    let feedback = feedback(&synthesis.state_feedback, &request, &input_limits);
+    let feedback = feedback(
+        &synthesis.state_feedback,
+        &request.plant,
+        request.bumpless,
+        &input_limits,
+    );
     Ok(Design {
         format: FORMAT,
         name: request.name,
@@ -142,13 +157,14 @@ pub fn assemble(request: Request) -> Result<Design, DesignError> {
             compensation: request.compensation,
             input_limits,
         },
-        truth: Truth::AsDesigned,
+        truth: request.truth,
         scenario: request.scenario,
         synthesis: Some(synthesis),
     })
 }
 
-fn scaling(signals: &Signals) -> Scaling {
+/// The nominal values of the signals.
+pub(crate) fn scaling(signals: &Signals) -> Scaling {
     let nominal = |signals: &[Signal]| signals.iter().map(|s| s.nominal).collect();
     Scaling {
         states: nominal(&signals.states),
@@ -167,9 +183,14 @@ fn limits(inputs: &[Signal]) -> Vec<Limits> {
 
 /// The certified gains as the controller runs them. What saturation takes off an input unwinds
 /// the integral by half of what would undo it; inputs without a limit never saturate.
-fn feedback(control: &super::StateFeedback, request: &Request, limits: &[Limits]) -> StateFeedback {
-    let mut feedback = control.for_controller(&request.plant);
-    feedback.bumpless = request.bumpless;
+pub(crate) fn feedback(
+    control: &super::StateFeedback,
+    plant: &SwitchedPlant,
+    bumpless: bool,
+    limits: &[Limits],
+) -> StateFeedback {
+    let mut feedback = control.for_controller(plant);
+    feedback.bumpless = bumpless;
     for gains in &mut feedback.modes {
         for (mut column, limit) in gains.anti_windup.column_iter_mut().zip(limits) {
             let limited = limit.min.is_some() || limit.max.is_some();
@@ -240,7 +261,7 @@ fn predictors(request: &Request, length: usize) -> Result<Vec<Predictor>, String
     let noise = &request.scenario.noise;
     let predictor = |(index, mode): (usize, &Mode)| {
         let amplitudes = amplitudes(mode, &request.signals.inputs);
-        match request.estimator.database {
+        match &request.estimator.database {
             DatabaseSource::Model => Ok(commissioning::model_predictor(
                 mode,
                 length,
@@ -252,13 +273,48 @@ fn predictors(request: &Request, length: usize) -> Result<Vec<Predictor>, String
                 let seed = COMMISSIONING_SEED + index as u64;
                 let database =
                     commissioning::commission(mode, &amplitudes, noise, length + counted, seed);
-                commissioning::predictor(&database, length)
+                commissioning::predictor(&database, length, None)
+                    .map_err(|what| format!("mode {}: {what}", index + 1))
+            }
+            DatabaseSource::Recorded(logs) => {
+                let stretches = logs.get(index).map_or(&[][..], Vec::as_slice);
+                recorded(request, stretches, length)
                     .map_err(|what| format!("mode {}: {what}", index + 1))
             }
         }
     };
     let modes = request.plant.modes.iter();
     modes.enumerate().map(predictor).collect()
+}
+
+/// The predictor of a log of one mode, in which the disturbance was at work.
+fn recorded(request: &Request, stretches: &[Database], length: usize) -> Result<Predictor, String> {
+    let known = request.estimator.disturbance.as_ref();
+    let disturbance = known.map(|known| RecordedDisturbance {
+        period: known.period / request.plant.sample_time,
+        count: known.harmonics,
+    });
+    let inputs = &request.signals.inputs;
+    let samples: usize = stretches.iter().map(Database::samples).sum();
+    let most = MOST_REGRESSORS / (inputs.len() * length).max(1);
+    if samples > most {
+        return Err(format!(
+            "the log has {samples} samples, more than are needed: shorten it to at most {most}"
+        ));
+    }
+    let predictor = commissioning::predictor_of_stretches(stretches, length, disturbance)?;
+    let units: Vec<f64> = inputs.iter().map(|input| input.nominal).collect();
+    let (ratio, input, lag) = commissioning::weakest_direction(&predictor, &units);
+    if ratio < LEAST_EXCITATION {
+        return Err(format!(
+            "the log excites input {} ({}) {lag} samples back too little (1 : {:.0e} of the strongest direction): \
+             record a run in which every input moves on its own",
+            input + 1,
+            inputs[input].name,
+            1.0 / ratio.max(f64::MIN_POSITIVE)
+        ));
+    }
+    Ok(predictor)
 }
 
 /// How far each input may be moved about the operating point: its nominal value, or less where a

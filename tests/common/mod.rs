@@ -125,7 +125,7 @@ pub fn controller(channel: Channel, noise: f64) -> ControllerParameters {
         .zip(1..)
         .map(|(mode, seed)| {
             let database = commissioning::commission(mode, &[1.0, 1.0], &[noise; 2], samples, seed);
-            commissioning::predictor(&database, length).unwrap()
+            commissioning::predictor(&database, length, None).unwrap()
         })
         .collect();
     let observer_gains = plant

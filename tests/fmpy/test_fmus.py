@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
     from conftest import Case
 
-EXAMPLES = ["paper"]
+EXAMPLES = ["paper", "paper_output", "tank"]
 pytestmark = pytest.mark.parametrize("example", EXAMPLES)
 
 

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
     from conftest import Case
 
-EXAMPLES = ["paper"]
+EXAMPLES = ["paper", "paper_output", "tank"]
 
 
 @pytest.mark.parametrize("example", EXAMPLES)
@@ -34,6 +34,13 @@ def test_noise_is_the_same_noise(make_case: Callable[[dict], Case], disturbed: s
     """The plant FMU draws the very noise of the native run."""
     case = make_case(design_file.scenario_a(disturbed=disturbed, reference="sine", noise=0.005))
     loop = fmu_loop.run(case.fmus, case.run.trajectories.ticks)
+    assert fmu_loop.differing(loop, case.run.trajectories, "ftc") == []
+
+
+def test_parallel_stepping(make_case: Callable[[dict], Case]) -> None:
+    """A master that steps both FMUs from the same old signals adds the one sample a latency-1 design expects."""
+    case = make_case(design_file.delayed())
+    loop = fmu_loop.run(case.fmus, case.run.trajectories.ticks, Schedule(parallel=True))
     assert fmu_loop.differing(loop, case.run.trajectories, "ftc") == []
 
 

@@ -126,11 +126,12 @@ def test_attenuation_by_frequency_sweep(finished: Finished) -> None:
         assert 0.0 < peak <= gamma
 
 
-def _in_units(loop: Augmented, units: dict, latency: int) -> Augmented:
-    """Returns a closed loop in the certificate's units."""
+def _in_certificate_coordinates(loop: Augmented, units: dict, basis: np.ndarray, latency: int) -> Augmented:
+    """Returns a closed loop in the certificate's units and the coordinates of its Lyapunov factor."""
     state = np.array([*units["states"], *(units["inputs"] * latency), *units["integrators"]])
+    L = state[:, None] * basis
     w, v = units["disturbance"], units["performance"]
-    return Augmented(loop.A / state[:, None] * state, loop.B, loop.E / state[:, None] * w, loop.H * state / v, loop.D)
+    return Augmented(np.linalg.solve(L, loop.A @ L), loop.B, np.linalg.solve(L, loop.E) * w, loop.H @ L / v, loop.D)
 
 
 def _least_eigenvalue(block: np.ndarray) -> float:
@@ -139,16 +140,14 @@ def _least_eigenvalue(block: np.ndarray) -> float:
     return float(np.linalg.eigvalsh(block * np.outer(scale, scale)).min())
 
 
-def test_certificate(finished: Finished) -> None:
-    """Every inequality (T2) of the shipped gains is positive definite with the shipped Lyapunov matrices."""
-    control = finished.record["synthesis"]["state_feedback"]
-    units, gamma = control["certificate"]["units"], control["gamma"]
-    matrices = [np.array(S) for S in control["certificate"]["lyapunov"]]
-    assert len(matrices) == 1, "a common certificate has one matrix"
-    (S,) = matrices
+def test_state_feedback_certificate(finished: Finished) -> None:
+    """Every inequality (T2) of the shipped gains is positive definite with the shipped S = L M L'."""
+    proved = finished.record["synthesis"]["state_feedback"]
+    units = proved["certificate"]["units"]
+    ((basis, S),) = ((np.array(f["basis"]), np.array(f["core"])) for f in proved["certificate"]["lyapunov"])
     latency = finished.record["controller"]["feedback"]["latency"]
-    for loop, level in zip(finished.loops(), gamma, strict=True):
-        model = _in_units(loop, units, latency)
+    for loop, level in zip(finished.loops(), finished.report["gamma"], strict=True):
+        model = _in_certificate_coordinates(loop, units, basis, latency)
         (N, s), q = model.E.shape, len(model.H)
         g = (level * units["disturbance"] / units["performance"]) ** 2
         zero = np.zeros
@@ -164,3 +163,17 @@ def test_certificate(finished: Finished) -> None:
         assert _least_eigenvalue(attenuation) > 0.0
         assert _least_eigenvalue(decay) > 0.0
     assert finished.report["certified"]
+
+
+def test_observer_certificate(finished: Finished) -> None:
+    """On every switch the estimation error shrinks in the shipped P: beta^2 P - F' P F is positive definite."""
+    observer = finished.record["controller"]["observer"]
+    certificate = finished.record["synthesis"]["observer"]["certificate"]
+    units = np.array(certificate["states"])
+    (P,) = (np.array(P) / np.outer(units, units) for P in certificate["lyapunov"])
+    beta = finished.request["observer"]["decay"]
+    for i, left in enumerate(finished.modes):
+        for j, entered in enumerate(finished.modes):
+            T = np.eye(len(left.A)) - np.array(observer["decoupling"][i][j]) @ entered.C
+            F = T @ left.A - np.array(observer["gains"][i]) @ left.C
+            assert _least_eigenvalue(np.block([[beta**2 * P, F.T @ P], [P @ F, P]])) > 0.0

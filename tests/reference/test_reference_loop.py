@@ -78,12 +78,23 @@ def test_scenario_a(make_case: Callable[[dict], Case], disturbed: str, reference
     assert_agreement(make_case(design_file.scenario_a(disturbed=disturbed, reference=reference, noise=noise)))
 
 
-@pytest.mark.parametrize("design", [harsh(), displaced()], ids=lambda design: design["name"])
+def bumpless() -> dict:
+    """Returns a design whose command does not jump at a mode switch."""
+    design = design_file.scenario_a(disturbed="state", reference="sine", noise=0.001)
+    design["name"] = "bumpless"
+    design["controller"] |= {"bumpless": True}
+    return design
+
+
+@pytest.mark.parametrize(
+    "design", [harsh(), displaced(), bumpless(), design_file.delayed()], ids=lambda design: design["name"]
+)
 def test_every_branch_of_the_on_line_path(make_case: Callable[[dict], Case], design: dict) -> None:
-    """Saturation, lost and stuck sensors, harmonics, operating points, sizes that all differ."""
+    """Saturation, lost and stuck sensors, harmonics, operating points, unequal sizes, bumpless switching, latency."""
     assert_agreement(make_case(design))
 
 
-def test_shipped_example(example_case: Callable[[str], Case]) -> None:
-    """The example a user copies."""
-    assert_agreement(example_case("paper"))
+@pytest.mark.parametrize("example", ["paper", "paper_output", "tank"])
+def test_shipped_example(example_case: Callable[[str], Case], example: str) -> None:
+    """The examples a user copies."""
+    assert_agreement(example_case(example))

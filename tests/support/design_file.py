@@ -90,3 +90,11 @@ def scenario_a(*, disturbed: str, reference: str = "square", noise: float = 0.0)
             "disturbance": [{"kind": "sine", "amplitude": 0.04, "period": period}],
         },
     }
+
+
+def delayed() -> dict:
+    """Returns example A designed for one sample of delay, which a master that steps both FMUs in parallel adds."""
+    design = scenario_a(disturbed="state", reference="levels", noise=0.005)
+    design["name"] = "delayed"
+    design["controller"] |= {"latency": 1, "lyapunov": "dwell", "decay": 0.9}
+    return design

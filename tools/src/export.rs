@@ -1,6 +1,7 @@
 //! `export`: zips prebuilt generic binaries with the design as their resource. Nothing is compiled.
 
 use crate::archive::{self, Contents};
+use crate::certificate::{self, Certificate};
 use crate::output::Staging;
 use crate::ssp::{self, Component, System};
 use crate::summary;
@@ -80,6 +81,8 @@ struct Exporter<'a> {
     design: &'a Design,
     /// The design as the binaries read it.
     resource: Vec<u8>,
+    /// The proof, as `verify` reads it.
+    certificate: Vec<u8>,
     interface: Interface,
     binaries: Vec<Binaries>,
 }
@@ -91,9 +94,12 @@ struct Exporter<'a> {
 /// One sentence: no certificate, no binaries, or the output directory.
 pub fn write(design: &Design, staging: Staging, ssp: bool) -> Result<String, String> {
     prove(design)?;
+    let resource = serde_json::to_vec(design).map_err(|error| error.to_string())?;
     let exporter = Exporter {
         design,
-        resource: serde_json::to_vec(design).map_err(|error| error.to_string())?,
+        certificate: serde_json::to_vec_pretty(&Certificate::of(design, &resource))
+            .map_err(|error| error.to_string())?,
+        resource,
         interface: Interface::from(design),
         binaries: Binaries::find()?,
     };
@@ -134,6 +140,7 @@ impl Exporter<'_> {
             ),
             ("model.png".into(), ICON.into()),
             ("resources/design.json".into(), self.resource.clone()),
+            (certificate::PATH.into(), self.certificate.clone()),
             (
                 "documentation/index.html".into(),
                 documentation(self.design, kind).into_bytes(),
@@ -262,7 +269,7 @@ impl Binaries {
 
 /// When the last of the two libraries was built; `None` unless both are there.
 fn newest(folder: &Path, library: impl Fn(&str) -> String) -> Option<SystemTime> {
-    let built = |binary| fs::metadata(folder.join(library(binary)))?.modified();
+    let built = |binary: &str| fs::metadata(folder.join(library(binary)))?.modified();
     let times = KINDS.iter().map(|kind| built(kind.binary));
     times
         .collect::<std::io::Result<Vec<_>>>()

@@ -72,7 +72,11 @@ impl Controller {
             trial.deviation.fill(0.0);
             kernel::add_scaled(&mut trial.deviation, -1.0, change);
             trial.integral.fill(0.0);
-            kernel::add_product(&mut trial.integral, &gains.integral_inverse, &trial.deviation);
+            kernel::add_product(
+                &mut trial.integral,
+                &gains.integral_inverse,
+                &trial.deviation,
+            );
             kernel::add_product(change, &gains.integral, &trial.integral);
         }
         if trial.additive.is_some() && compensate == Compensate::Estimate {
