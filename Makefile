@@ -9,8 +9,12 @@ ZIG := target/platforms/zig
 
 .PHONY: build fmu-linux64 fmu-all test test-rust test-python demo bench fuzz soak memcheck lint clean
 
+# The FMU binaries are made by themselves, with the profile meant for them: built with the whole
+# workspace they would carry the solver's symbols along.
 build:
 	cargo build --release --workspace
+	cargo build --profile fmu --package ftc-controller-fmu --package ftc-plant-fmu
+	tools/platforms/native.sh
 
 # FMU binaries beyond those for this machine; `ftc-fmu export` packs whatever is built and is not
 # older than the program. The first needs glibc 2.17 only; the others see docs/platforms.md.

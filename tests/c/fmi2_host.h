@@ -6,7 +6,15 @@
 #ifndef FMI2_HOST_H
 #define FMI2_HOST_H
 
+#ifdef _WIN32
+#include <windows.h>
+#define dlopen(path, flags) ((void *)LoadLibraryA(path))
+#define dlsym(library, name) ((void *)(size_t)GetProcAddress((HMODULE)(library), name))
+#define dlclose(library) (!FreeLibrary((HMODULE)(library)))
+#define dlerror() "the library cannot be loaded"
+#else
 #include <dlfcn.h>
+#endif
 #include <stdarg.h>
 #include <stddef.h>
 #include <stdio.h>

@@ -11,11 +11,12 @@ import numpy as np
 from fmu_manipulation_toolbox.assembly import AssemblyNode
 from fmu_manipulation_toolbox.checker import get_checkers
 from fmu_manipulation_toolbox.operations import FMU
+from libcosimpy import CosimConstants
 from libcosimpy.CosimExecution import CosimExecution
 from libcosimpy.CosimObserver import CosimObserver
 from libcosimpy.CosimSlave import CosimLocalSlave
 
-from fmu_loop import MEASURED, Schedule, slave
+from fmu_loop import Schedule, slave
 from fmu_loop import run as run_fmpy
 
 if TYPE_CHECKING:
@@ -29,6 +30,10 @@ NANOSECONDS = 1_000_000_000
 Loop = dict[str, np.ndarray]
 
 
+def _sample_time(pair: Exported) -> float:
+    return float(fmpy.read_model_description(pair.plant).defaultExperiment.stepSize)
+
+
 def _variables(fmu: Path) -> list:
     return fmpy.read_model_description(fmu).modelVariables
 
@@ -38,10 +43,13 @@ def _named(fmu: Path, base: str) -> list:
     return [variable for variable in _variables(fmu) if variable.name.split("[")[0] == base]
 
 
-def _links(pair: Exported) -> Iterator[tuple[Path, object, Path, object]]:
-    """Yields the connections of the loop: from FMU and variable, to FMU and variable."""
+def _links(pair: Exported, mode: str) -> Iterator[tuple[Path, object, Path, object]]:
+    """Yields the connections of the loop: from FMU and variable, to FMU and variable.
+
+    The mode goes by its Integer, `mode`, or by its Real, `mode_real`.
+    """
     for base, source, target in [
-        *((base, pair.plant, pair.controller) for base in MEASURED),
+        *((base, pair.plant, pair.controller) for base in ("y", "y_ref", mode)),
         ("u", pair.controller, pair.plant),
     ]:
         for out, into in zip(_named(source, base), _named(target, base), strict=True):
@@ -70,16 +78,18 @@ def _observe(execution: CosimExecution, pair: Exported, steps: int) -> Loop:
 
 
 def in_libcosim(pair: Exported, steps: int) -> Loop:
-    """Two FMUs connected one by one in libcosim, whose time is whole nanoseconds."""
-    te = fmpy.read_model_description(pair.plant).defaultExperiment.stepSize
+    """Two FMUs connected one by one in libcosim, whose time is whole nanoseconds, by Reals only."""
+    te = _sample_time(pair)
     execution = CosimExecution.from_step_size(round(te * NANOSECONDS))
     slaves = {
         fmu: CosimLocalSlave(str(fmu), name) for fmu, name in ((pair.controller, "controller"), (pair.plant, "plant"))
     }
     indices = {fmu: execution.add_local_slave(added) for fmu, added in slaves.items()}
-    for source, out, target, into in _links(pair):
-        connect = execution.connect_integer_variables if out.type == "Integer" else execution.connect_real_variables
-        assert connect(indices[source], out.valueReference, indices[target], into.valueReference)
+    for source, out, target, into in _links(pair, "mode_real"):
+        done = execution.connect_real_variables(
+            indices[source], out.valueReference, indices[target], into.valueReference
+        )
+        assert done == CosimConstants.success
     return _observe(execution, pair, steps)
 
 
@@ -91,11 +101,12 @@ def in_libcosim_from_package(pair: Exported, steps: int) -> Loop:
 def in_container(pair: Exported, steps: int) -> Loop:
     """Both FMUs packed into one by fmu-manipulation-toolbox, which fmpy runs."""
     folder = pair.plant.parent
-    te = fmpy.read_model_description(pair.plant).defaultExperiment.stepSize
+    te = _sample_time(pair)
     node = AssemblyNode("container.fmu", step_size=te, auto_link=False, auto_input=False, auto_output=False)
-    for fmu in (pair.controller, pair.plant):
+    # The container initializes in this order; the controller is to find a mode when its turn comes.
+    for fmu in (pair.plant, pair.controller):
         node.add_fmu(fmu.name)
-    for source, out, target, into in _links(pair):
+    for source, out, target, into in _links(pair, "mode"):
         node.add_link(source.name, out.name, target.name, into.name)
     for base, fmu in (("y", pair.plant), ("u", pair.controller)):
         for variable in _named(fmu, base):

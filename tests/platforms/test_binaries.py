@@ -15,9 +15,10 @@ if TYPE_CHECKING:
     from pathlib import Path
 
 RELEASE = commands.PROGRAM.parent
-BUILT_HERE = sorted(RELEASE.glob("libftc_*.so"))
-PORTABLE = sorted((RELEASE / "fmu-binaries").glob("*linux*/ftc_*.so"))
+PACKED = sorted((RELEASE / "fmu-binaries").glob("*linux*/ftc_*.so"))
 OLDEST = (2, 17)
+# What the newest glibc holds in one library, an old one keeps in several.
+PORTABLE = [path for path in PACKED if "libpthread.so.0" in elf.read(path).needed]
 SYSTEM = re.compile(r"(libc|libm|libgcc_s|libpthread|libdl|ld-linux[-a-z0-9_]*)\.so\.[0-9]")
 HEADER = commands.ROOT / "tests" / "c" / "fmi2_host.h"
 
@@ -32,11 +33,11 @@ def _standard() -> set[str]:
 @pytest.mark.skipif(platform.system() != "Linux", reason="reads the binaries of a Linux machine")
 def test_a_build_leaves_both_binaries() -> None:
     """Controller and plant are there, so that the tests below are about something."""
-    assert [path.name for path in BUILT_HERE] == ["libftc_controller.so", "libftc_plant.so"]
+    assert {"ftc_controller.so", "ftc_plant.so"} <= {path.name for path in PACKED}
     assert len(_standard()) == 44
 
 
-@pytest.mark.parametrize("path", BUILT_HERE + PORTABLE, ids=lambda path: f"{path.parent.name}-{path.stem}")
+@pytest.mark.parametrize("path", PACKED, ids=lambda path: f"{path.parent.name}-{path.stem}")
 def test_a_binary_offers_the_standard_and_needs_the_system_only(path: Path) -> None:
     """Exactly the standard's functions are visible, and only the C library's parts are needed."""
     library = elf.read(path)
@@ -44,8 +45,8 @@ def test_a_binary_offers_the_standard_and_needs_the_system_only(path: Path) -> N
     assert [name for name in library.needed if not SYSTEM.fullmatch(name)] == []
 
 
-@pytest.mark.parametrize("path", BUILT_HERE + PORTABLE, ids=lambda path: f"{path.parent.name}-{path.stem}")
-def test_no_elementary_function_comes_from_the_machine(path: Path) -> None:
+@pytest.mark.parametrize("path", [path for path in PACKED if path.stem == "ftc_controller"], ids=str)
+def test_no_elementary_function_of_the_controller_comes_from_the_machine(path: Path) -> None:
     """Each C library rounds its own way: the bits would depend on where an FMU runs."""
     mathematics = {"sin", "cos", "tan", "exp", "exp2", "expm1", "log", "log2", "log10", "log1p", "pow", "hypot"}
     mathematics |= {"asin", "acos", "atan", "atan2", "sinh", "cosh", "tanh", "cbrt", "sincos", "tgamma", "lgamma"}

@@ -58,6 +58,10 @@ pub fn describe(system: &System) -> io::Result<Vec<u8>> {
                 "xmlns:ssc",
                 "http://ssp-standard.org/SSP1/SystemStructureCommon",
             ),
+            (
+                "xmlns:osp",
+                "http://opensimulationplatform.com/SSP/OSPAnnotations",
+            ),
             ("version", "1.0"),
             ("name", system.name),
             (
@@ -169,7 +173,7 @@ fn write_connection(xml: &mut Xml, [from, to]: Ends) -> io::Result<()> {
 }
 
 /// The standard knows start and stop; the communication step is said in the annotation that the
-/// Open Simulation Platform reads. Others ignore it.
+/// Open Simulation Platform reads (no attribute may stand at its `Algorithm`). Others ignore it.
 fn write_experiment(xml: &mut Xml, system: &System) -> io::Result<()> {
     let stop_time = format!("{:?}", system.stop_time);
     let step_size = format!("{:?}", system.step_size);
@@ -182,10 +186,6 @@ fn write_experiment(xml: &mut Xml, system: &System) -> io::Result<()> {
                         .with_attribute(("type", "com.opensimulationplatform"))
                         .write_inner_content(|xml| {
                             xml.create_element("osp:Algorithm")
-                                .with_attribute((
-                                    "xmlns:osp",
-                                    "http://opensimulationplatform.com/SSP/OSPAnnotations",
-                                ))
                                 .write_inner_content(|xml| {
                                     xml.create_element("osp:FixedStepAlgorithm")
                                         .with_attribute(("baseStepSize", step_size.as_str()))
