@@ -52,6 +52,18 @@ pub fn add_scaled(out: &mut [f64], factor: f64, vector: &[f64]) {
     }
 }
 
+/// `matrix -= scale * vector vector'`, for a square matrix kept row after row.
+///
+/// The product of two entries is taken before the factor, so a symmetric matrix stays symmetric
+/// to the last bit: under forgetting, an asymmetry would grow without end.
+pub fn subtract_square(matrix: &mut [f64], scale: f64, vector: &[f64]) {
+    for (row, &left) in matrix.chunks_exact_mut(vector.len().max(1)).zip(vector) {
+        for (value, &right) in row.iter_mut().zip(vector) {
+            *value -= scale * (left * right);
+        }
+    }
+}
+
 /// `out = left - right`.
 pub fn difference(out: &mut [f64], left: &[f64], right: &[f64]) {
     for ((result, &l), &r) in out.iter_mut().zip(left).zip(right) {

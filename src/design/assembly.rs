@@ -65,8 +65,8 @@ pub enum DatabaseSource {
     Commission,
     /// The model's own Markov parameters.
     Model,
-    /// Logs of healthy operation, one per mode.
-    Recorded(Vec<Database>),
+    /// Logs of healthy operation: for each mode, the stretches in which it was active.
+    Recorded(Vec<Vec<Database>>),
 }
 
 /// How thresholds are chosen.
@@ -114,6 +114,9 @@ const COMMISSIONING_SEED: u64 = 20;
 /// Least ratio of the weakest to the strongest excited direction of a recorded database.
 const LEAST_EXCITATION: f64 = 1e-4;
 
+/// The most entries of the least-squares problem of one mode: beyond it memory runs short.
+const MOST_REGRESSORS: usize = 20_000_000;
+
 /// Samples a sliding window holds beyond those its own inputs can explain.
 const WINDOW_MARGIN: usize = 20;
 
@@ -136,13 +139,19 @@ pub fn assemble(request: Request) -> Result<Design, DesignError> {
         &scaling,
     )?;
     let input_limits = limits(&request.signals.inputs);
+    let feedback = feedback(
+        &synthesis.state_feedback,
+        &request.plant,
+        request.bumpless,
+        &input_limits,
+    );
     Ok(Design {
         format: FORMAT,
         name: request.name,
         signals: request.signals,
         controller: ControllerParameters {
             plant: request.plant,
-            feedback: feedback(&synthesis.state_feedback, request.bumpless, &input_limits),
+            feedback,
             observer: synthesis.observer.observer.clone(),
             estimator,
             compensation: request.compensation,
@@ -154,7 +163,8 @@ pub fn assemble(request: Request) -> Result<Design, DesignError> {
     })
 }
 
-fn scaling(signals: &Signals) -> Scaling {
+/// The nominal values of the signals.
+pub(crate) fn scaling(signals: &Signals) -> Scaling {
     let nominal = |signals: &[Signal]| signals.iter().map(|s| s.nominal).collect();
     Scaling {
         states: nominal(&signals.states),
@@ -173,8 +183,13 @@ fn limits(inputs: &[Signal]) -> Vec<Limits> {
 
 /// The certified gains as the controller runs them. What saturation takes off an input unwinds
 /// the integral by half of what would undo it; inputs without a limit never saturate.
-fn feedback(control: &super::StateFeedback, bumpless: bool, limits: &[Limits]) -> StateFeedback {
-    let mut feedback = control.for_controller();
+pub(crate) fn feedback(
+    control: &super::StateFeedback,
+    plant: &SwitchedPlant,
+    bumpless: bool,
+    limits: &[Limits],
+) -> StateFeedback {
+    let mut feedback = control.for_controller(plant);
     feedback.bumpless = bumpless;
     for gains in &mut feedback.modes {
         for (mut column, limit) in gains.anti_windup.column_iter_mut().zip(limits) {
@@ -261,28 +276,41 @@ fn predictors(request: &Request, length: usize) -> Result<Vec<Predictor>, String
                 commissioning::predictor(&database, length, None)
                     .map_err(|what| format!("mode {}: {what}", index + 1))
             }
-            DatabaseSource::Recorded(databases) => recorded(request, &databases[index], length)
-                .map_err(|what| format!("mode {}: {what}", index + 1)),
+            DatabaseSource::Recorded(logs) => {
+                let stretches = logs.get(index).map_or(&[][..], Vec::as_slice);
+                recorded(request, stretches, length)
+                    .map_err(|what| format!("mode {}: {what}", index + 1))
+            }
         }
     };
     let modes = request.plant.modes.iter();
     modes.enumerate().map(predictor).collect()
 }
 
-/// The predictor of a recorded database, in which the disturbance was at work.
-fn recorded(request: &Request, database: &Database, length: usize) -> Result<Predictor, String> {
+/// The predictor of a log of one mode, in which the disturbance was at work.
+fn recorded(request: &Request, stretches: &[Database], length: usize) -> Result<Predictor, String> {
     let known = request.estimator.disturbance.as_ref();
     let disturbance = known.map(|known| RecordedDisturbance {
         period: known.period / request.plant.sample_time,
         count: known.harmonics,
     });
-    let predictor = commissioning::predictor(database, length, disturbance)?;
-    let (ratio, input, lag) = commissioning::weakest_direction(&predictor, database.inputs.ncols());
+    let inputs = &request.signals.inputs;
+    let samples: usize = stretches.iter().map(Database::samples).sum();
+    let most = MOST_REGRESSORS / (inputs.len() * length).max(1);
+    if samples > most {
+        return Err(format!(
+            "the log has {samples} samples, more than are needed: shorten it to at most {most}"
+        ));
+    }
+    let predictor = commissioning::predictor_of_stretches(stretches, length, disturbance)?;
+    let units: Vec<f64> = inputs.iter().map(|input| input.nominal).collect();
+    let (ratio, input, lag) = commissioning::weakest_direction(&predictor, &units);
     if ratio < LEAST_EXCITATION {
         return Err(format!(
-            "the database excites input {} {lag} samples back too little (1 : {:.0e} of the strongest direction): \
+            "the log excites input {} ({}) {lag} samples back too little (1 : {:.0e} of the strongest direction): \
              record a run in which every input moves on its own",
             input + 1,
+            inputs[input].name,
             1.0 / ratio.max(f64::MIN_POSITIVE)
         ));
     }

@@ -10,13 +10,23 @@ use crate::plant::{Mode, spectral_radius};
 use crate::simulate::noise;
 use nalgebra::{DMatrix, DVector};
 
-/// Healthy inputs and outputs of one mode: row `k` holds `u(k)` (m) and `y(k)` (p).
+/// Healthy inputs and outputs of one mode, without a gap: row `k` holds `u(k)` (m) and `y(k)` (p).
 #[derive(Clone, Debug, PartialEq)]
 pub struct Database {
+    /// Number of the first sample in the log it was taken from; it only tells the phase of a
+    /// periodic disturbance between stretches of one log.
+    pub first: usize,
     /// Inputs relative to the operating point (samples x m).
     pub inputs: DMatrix<f64>,
     /// Outputs relative to the operating point (samples x p).
     pub outputs: DMatrix<f64>,
+}
+
+impl Database {
+    /// Number of samples.
+    pub fn samples(&self) -> usize {
+        self.inputs.nrows()
+    }
 }
 
 /// The truncation error allowed when a response length is chosen, relative to the response itself.
@@ -87,7 +97,11 @@ pub fn commission(
         outputs.row_mut(k).tr_copy_from(&y);
         x = &mode.a * x + &mode.b * u;
     }
-    Database { inputs, outputs }
+    Database {
+        first: 0,
+        inputs,
+        outputs,
+    }
 }
 
 /// A periodic disturbance present while a database was recorded.
@@ -99,7 +113,22 @@ pub struct RecordedDisturbance {
     pub count: usize,
 }
 
-/// The predictor of a database by least squares.
+/// The predictor of a database by least squares: [`predictor_of_stretches`] with a single one.
+///
+/// # Errors
+/// As [`predictor_of_stretches`].
+pub fn predictor(
+    database: &Database,
+    response_length: usize,
+    disturbance: Option<RecordedDisturbance>,
+) -> Result<Predictor, String> {
+    let stretches = std::slice::from_ref(database);
+    predictor_of_stretches(stretches, response_length, disturbance)
+}
+
+/// The predictor of one mode from every stretch of a log in which it was active, by least squares.
+/// The first `response_length` samples of a stretch only serve as past inputs: what came before
+/// them belongs to another mode.
 ///
 /// A disturbance of known period is explained by sines and cosines of its own, which are then
 /// dropped: their phases belong to the recording. They stand first in the factorisation, so the
@@ -109,23 +138,22 @@ pub struct RecordedDisturbance {
 /// have an enormous leverage and are never trusted.
 ///
 /// # Errors
-/// The database has too few samples for `response_length`.
-pub fn predictor(
-    database: &Database,
+/// The stretches have too few samples for `response_length`, or no input ever moves.
+pub fn predictor_of_stretches(
+    stretches: &[Database],
     response_length: usize,
     disturbance: Option<RecordedDisturbance>,
 ) -> Result<Predictor, String> {
-    let (total, m) = database.inputs.shape();
-    let p = database.outputs.ncols();
+    let (m, p) = stretches.first().map_or((0, 0), |stretch| {
+        (stretch.inputs.ncols(), stretch.outputs.ncols())
+    });
     let waves = disturbance.map_or(0, |known| 2 * known.count);
     let inputs = m * response_length;
     let unknowns = waves + inputs;
-    let samples = total.saturating_sub(response_length);
+    let windows = windows(stretches, response_length);
+    let samples = windows.len();
     if samples <= unknowns {
-        return Err(format!(
-            "{total} samples are too few to identify {unknowns} response coefficients: record at least {}",
-            unknowns + response_length + 1
-        ));
+        return Err(too_few(stretches, unknowns, response_length));
     }
     let wave = |k: usize, column: usize| {
         let period = disturbance.map_or(1.0, |known| known.period);
@@ -136,10 +164,11 @@ pub fn predictor(
             angle.cos()
         }
     };
-    let regressors = DMatrix::from_fn(samples, unknowns, |k, column| {
+    let regressors = DMatrix::from_fn(samples, unknowns, |row, column| {
+        let (stretch, k) = windows[row];
         match column.checked_sub(waves) {
-            None => wave(k, column),
-            Some(past) => database.inputs[(k + past / m, past % m)],
+            None => wave(stretch.first + k, column),
+            Some(past) => stretch.inputs[(k + past / m, past % m)],
         }
     });
     let ridge = 1e-9 * regressors.columns(waves, inputs).norm() / (inputs as f64).sqrt();
@@ -155,8 +184,9 @@ pub fn predictor(
     stacked
         .view_mut((samples, 0), (unknowns, unknowns))
         .fill_diagonal(ridge);
-    let targets = DMatrix::from_fn(samples, p, |k, output| {
-        database.outputs[(k + response_length, output)]
+    let targets = DMatrix::from_fn(samples, p, |row, output| {
+        let (stretch, k) = windows[row];
+        stretch.outputs[(k + response_length, output)]
     });
     let qr = stacked.qr();
     let mut rotated = targets.clone().resize_vertically(samples + unknowns, 0.0);
@@ -179,10 +209,39 @@ pub fn predictor(
     })
 }
 
+/// Every stretch and sample at which a window of past inputs begins.
+fn windows(stretches: &[Database], response_length: usize) -> Vec<(&Database, usize)> {
+    let of = |stretch| {
+        let count = Database::samples(stretch).saturating_sub(response_length);
+        (0..count).map(move |k| (stretch, k))
+    };
+    stretches.iter().flat_map(of).collect()
+}
+
+fn too_few(stretches: &[Database], unknowns: usize, response_length: usize) -> String {
+    let total: usize = stretches.iter().map(Database::samples).sum();
+    let needed = unknowns + 1 + response_length * stretches.len().max(1);
+    let shape = match stretches.len() {
+        0 | 1 => format!("{total} samples"),
+        count => format!(
+            "{total} samples in {count} stretches, each of which spends its first {response_length} on the past,"
+        ),
+    };
+    format!(
+        "{shape} are too few to identify {unknowns} response coefficients: record at least {needed}"
+    )
+}
+
 /// How well each input was excited: the smallest singular value of `R` over the largest, and the
 /// input (0-based) and lag (samples, from 1) that weigh most in the direction excited least.
-pub fn weakest_direction(predictor: &Predictor, inputs: usize) -> (f64, usize, usize) {
-    let svd = predictor.factor.clone().svd(false, true);
+/// Inputs are measured in `units` (m), so that a kilovolt and an ampere can be compared.
+pub fn weakest_direction(predictor: &Predictor, units: &[f64]) -> (f64, usize, usize) {
+    let inputs = units.len();
+    let mut factor = predictor.factor.clone();
+    for (column, mut entries) in factor.column_iter_mut().enumerate() {
+        entries /= units[column % inputs];
+    }
+    let svd = factor.svd(false, true);
     let values = &svd.singular_values;
     let ratio = values.min() / values.max().max(f64::MIN_POSITIVE);
     let heaviest = svd
@@ -313,6 +372,32 @@ mod tests {
         assert!(error(None) > 1e-2);
     }
 
+    /// Two stretches of a log with another mode between them identify what one long log does.
+    #[test]
+    fn stretches_are_joined_without_mixing_their_pasts() {
+        let mode = stable_mode(&[0.3; 21]);
+        let length = response_length(std::slice::from_ref(&mode)).unwrap();
+        let exact = model_predictor(&mode, length, &[1.0, 2.0], &[0.0, 0.0]).response;
+        let period = 37.0;
+        let stretches = [(0, 1), (777, 2)].map(|(first, seed)| {
+            let mut stretch = commission(&mode, &[1.0, 2.0], &[0.0, 0.0], 3 * length, seed);
+            for (k, mut row) in stretch.outputs.row_iter_mut().enumerate() {
+                row[1] += 0.3 * (core::f64::consts::TAU * (first + k) as f64 / period).sin();
+            }
+            Database { first, ..stretch }
+        });
+        let known = RecordedDisturbance { period, count: 1 };
+        assert!(predictor(&stretches[0], length, Some(known)).is_err());
+        let found = predictor_of_stretches(&stretches, length, Some(known)).unwrap();
+        assert_eq!(found.samples, 4 * length);
+        let error = (&found.response - &exact).norm() / exact.norm();
+        assert!(error < 1e-5, "{error}");
+        let mut shifted = stretches;
+        shifted[1].first += 10;
+        let mixed = predictor_of_stretches(&shifted, length, Some(known)).unwrap();
+        assert!((mixed.response - &exact).norm() / exact.norm() > 1e-3);
+    }
+
     #[test]
     fn the_weakest_direction_is_the_input_that_never_moved() {
         let mode = stable_mode(&[0.4; 21]);
@@ -322,7 +407,7 @@ mod tests {
             None,
         )
         .unwrap();
-        let (ratio, input, _) = weakest_direction(&found, 2);
+        let (ratio, input, _) = weakest_direction(&found, &[1.0, 1.0]);
         assert!(ratio < 1e-6 && input == 1);
     }
 

@@ -28,7 +28,8 @@ pub struct ModeGains {
     /// `K_i` (m x n), multiplies the deviation of the state from the operating point.
     #[serde(with = "rows")]
     pub state_feedback: DMatrix<f64>,
-    /// `G_i` (m x r), multiplies the integral of the tracking error.
+    /// `G_i` (m x q), multiplies the integral part: the integrals of the tracking error, then the
+    /// resonators (`q = r` without an internal model).
     #[serde(with = "rows")]
     pub integral: DMatrix<f64>,
     /// Multiplies the command that is acting now (m x m); no columns without latency.
@@ -67,19 +68,25 @@ impl StateFeedback {
         certificate::verify_state_feedback(plant, self)
     }
 
-    /// What the on-line controller needs of it. The anti-windup gain is `G^+`: the integral is
-    /// pulled back to where the clamped command would have come from.
-    pub fn for_controller(&self) -> parameters::StateFeedback {
-        let modes = self.modes.iter().map(|gains| FeedbackGains {
-            state_feedback: gains.state_feedback.clone(),
-            integral: gains.integral.clone(),
-            previous_input: gains.previous_input.clone(),
-            anti_windup: pseudo_inverse(&gains.integral, 1e-12),
+    /// What the on-line controller needs of it on this plant. Every inverse is taken here, so that
+    /// an FMU only multiplies and adds and gives the same bits on every machine. The anti-windup
+    /// gain is `G^+`: the integral is pulled back to where the clamped command would have come from.
+    pub fn for_controller(&self, plant: &SwitchedPlant) -> parameters::StateFeedback {
+        let modes = self.modes.iter().zip(&plant.modes).map(|(gains, mode)| {
+            let integral_inverse = pseudo_inverse(&gains.integral, 1e-12);
+            FeedbackGains {
+                state_feedback: gains.state_feedback.clone(),
+                integral: gains.integral.clone(),
+                previous_input: gains.previous_input.clone(),
+                anti_windup: integral_inverse.clone(),
+                integral_inverse,
+                output_feedback: &gains.state_feedback * pseudo_inverse(&mode.c, 1e-12),
+            }
         });
         parameters::StateFeedback {
             tracked: self.spec.tracked.clone(),
             latency: self.spec.latency,
-            resonators: Vec::new(),
+            resonators: self.spec.resonators.clone(),
             bumpless: false,
             modes: modes.collect(),
         }

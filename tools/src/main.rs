@@ -14,7 +14,6 @@ mod export;
 mod failure;
 mod output;
 mod progress;
-#[allow(dead_code)]
 mod report;
 mod reproduce;
 mod simulate;

@@ -111,10 +111,8 @@ impl Adaptation {
             kernel::add_scaled(row, scale * adapted_error, &self.direction);
             kernel::bound(row);
         }
-        for (row, &factor) in self.covariance.chunks_exact_mut(size).zip(&self.direction) {
-            kernel::add_scaled(row, -scale * factor, &self.direction);
-            kernel::bound(row);
-        }
+        kernel::subtract_square(&mut self.covariance, scale, &self.direction);
+        kernel::bound(&mut self.covariance);
         if self.strayed(predictor) {
             self.change.fill(0.0);
             self.adapted_error.fill(0.0);
@@ -135,7 +133,8 @@ fn covariance(factor: &DMatrix<f64>) -> Vec<f64> {
     let inverse = factor
         .solve_upper_triangular(&DMatrix::identity(size, size))
         .unwrap_or_else(|| DMatrix::zeros(size, size));
-    let covariance = &inverse * inverse.transpose();
+    let product = &inverse * inverse.transpose();
+    let covariance = 0.5 * (&product + product.transpose());
     covariance.iter().map(|&v| kernel::bounded(v)).collect()
 }
 

@@ -67,9 +67,8 @@ impl HarmonicState {
 
     /// Adds the learned response to `outputs` (p).
     pub fn add_response(&self, outputs: &mut [f64]) {
-        let size = self.regressor.len().max(1);
-        for (output, row) in outputs.iter_mut().zip(self.coefficients.chunks_exact(size)) {
-            *output += kernel::dot(row, &self.regressor);
+        for (output, response) in outputs.iter_mut().zip(self.responses()) {
+            *output += response;
         }
     }
 
@@ -84,6 +83,26 @@ impl HarmonicState {
             *value = kernel::dot(row, &self.regressor);
         }
         kernel::dot(&self.direction, &self.regressor).max(0.0)
+    }
+
+    /// The sines and cosines of the last [`rotate`](Self::rotate) (q).
+    pub fn regressor(&self) -> &[f64] {
+        &self.regressor
+    }
+
+    /// The learned response of each sensor.
+    pub fn responses(&self) -> impl Iterator<Item = f64> {
+        let size = self.regressor.len().max(1);
+        let rows = self.coefficients.chunks_exact(size);
+        rows.map(|row| kernel::dot(row, &self.regressor))
+    }
+
+    /// Replaces what was learned of one sensor (q).
+    pub fn replace(&mut self, sensor: usize, waves: &[f64]) {
+        let size = self.regressor.len().max(1);
+        if let Some(row) = self.coefficients.chunks_exact_mut(size).nth(sensor) {
+            kernel::copy(row, waves);
+        }
     }
 
     /// Whether enough was learned to say something of another mode.
@@ -146,9 +165,9 @@ impl HarmonicState {
             kernel::add_scaled(row, scale * error, &self.direction);
             kernel::bound(row);
         }
-        for (row, &factor) in self.covariance.chunks_exact_mut(size).zip(&self.direction) {
-            kernel::add_scaled(row, -scale * factor, &self.direction);
-            row.iter_mut().for_each(|v| *v = kernel::bounded(*v / keep));
+        kernel::subtract_square(&mut self.covariance, scale, &self.direction);
+        for value in &mut self.covariance {
+            *value = kernel::bounded(*value / keep);
         }
     }
 }
@@ -163,6 +182,34 @@ fn add_at(values: &mut [f64], index: usize, amount: f64) {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// Rounding once made the covariance asymmetric, and forgetting let that grow until, after some
+    /// ten thousand samples, healthy sensors were accused.
+    #[test]
+    fn learning_for_ever_stays_sound() {
+        let harmonics = Harmonics {
+            period: 71.11350685098513,
+            count: 2,
+            memory: 200.0,
+            initial_variance: 33.4,
+        };
+        let mut state = HarmonicState::new(&harmonics, 1);
+        let mut noise = [0.0];
+        for k in 0..300_000 {
+            crate::simulate::noise::standard_normal(5, k, &mut noise);
+            state.rotate(&harmonics, k);
+            let leverage = state.leverage();
+            let mut predicted = [0.0];
+            state.add_response(&mut predicted);
+            let truth = libm::sin(core::f64::consts::TAU * k as f64 / harmonics.period);
+            state.learn(&harmonics, &[truth + 0.01 * noise[0] - predicted[0]]);
+            assert!(k < 1000 || leverage < 0.1, "leverage {leverage} at {k}");
+            assert!(
+                k < 1000 || (truth - predicted[0]).abs() < 0.02,
+                "error at {k}"
+            );
+        }
+    }
 
     #[test]
     fn learns_amplitude_and_phase_of_every_harmonic() {

@@ -197,9 +197,9 @@ mod tests {
             let expected = (DMatrix::from_row_slice(1, 12, &y) * projector)[(0, 11)];
             let mut window = SlidingWindow::new(4, 1, 12);
             let mut out = [0.0];
-            for k in 0..12 {
-                let column: Vec<f64> = u.column(k).iter().copied().collect();
-                window.residual(&column, &[y[k]], &mut out);
+            for (column, y) in u.column_iter().zip(y) {
+                let column: Vec<f64> = column.iter().copied().collect();
+                window.residual(&column, &[y], &mut out);
             }
             prop_assert!((out[0] - expected).abs() < 1e-9);
         }
