@@ -135,6 +135,7 @@ pub fn design(dice: &mut Dice) -> Design {
                 }),
             },
             compensation: Compensation::VirtualSensor,
+            truth: ftc::simulate::Truth::AsDesigned,
             scenario,
         };
         if let Ok(design) = assemble(request) {

@@ -5,11 +5,12 @@
 use crate::design_file::check;
 use crate::design_file::defaults;
 use crate::design_file::schema::{
-    self, CompensationMethod, DesignFile, EstimatorMethod, LyapunovKind, ObserverKind, PlantModel,
-    SignalInfo,
+    self, CompensationMethod, DesignFile, EstimatorMethod, LyapunovKind, ObjectiveKind,
+    ObserverKind, PlantModel, SignalInfo,
 };
 use crate::design_file::signal::Signal as SignalOverTime;
-use crate::design_file::values::NumberOrList;
+use crate::design_file::values::{NameOrList, NumberOrList};
+use crate::healthy_log::Logs;
 use ftc::control::parameters;
 use ftc::design::assembly::{DatabaseSource, EstimatorSpec, KnownDisturbance, Request, Threshold};
 use ftc::design::{ControlSpec, Lyapunov, Objective, ObserverSpec, Signal, Signals};
@@ -43,7 +44,12 @@ pub fn request(file: &DesignFile, folder: &Path) -> Result<Request, String> {
     let control = control(&file.controller, &signals, dims)?;
     let disturbance = disturbance(file, dims)?;
     let observer = observer(&file.observer, &control)?;
-    let estimator = estimator(&file.estimator, disturbance, dims)?;
+    let logs = Logs {
+        plant: &plant,
+        signals: &signals,
+        folder,
+    };
+    let estimator = estimator(&file.estimator, disturbance, dims, &logs)?;
     let scenario = Play {
         scenario: &file.scenario,
         known: estimator.disturbance.as_ref(),
@@ -75,23 +81,11 @@ fn at<T>(key: &str, result: Result<T, String>) -> Result<T, String> {
 
 /// Says no to what the design file's contract knows and this release does not do.
 fn refuse_unbuilt(file: &DesignFile) -> Result<(), String> {
-    let estimator = &file.estimator;
-    let database = estimator.database.as_deref().unwrap_or(defaults::DATABASE);
-    let refusals = [
-        (
-            file.controller.internal_model == Some(true),
-            "controller.internal_model = true",
-            "leave the key out",
-        ),
-        (
-            database.to_lowercase().ends_with(".csv"),
-            "estimator.database from a CSV file",
-            "use \"commission\" or \"model\"",
-        ),
-    ];
-    match refusals.iter().find(|(asked, ..)| *asked) {
-        Some((_, what, instead)) => Err(format!("{what} is not built yet: {instead}")),
-        None => Ok(()),
+    match file.controller.internal_model {
+        Some(true) => {
+            Err("controller.internal_model = true is not built yet: leave the key out".into())
+        }
+        _ => Ok(()),
     }
 }
 
@@ -376,7 +370,11 @@ fn control(
         latency,
         lyapunov: lyapunov(given.lyapunov.unwrap_or(defaults::LYAPUNOV)),
         decay,
-        objective: Objective::Attenuation,
+        objective: match given.objective.unwrap_or(defaults::OBJECTIVE) {
+            ObjectiveKind::Attenuation => Objective::Attenuation,
+            ObjectiveKind::Decay => Objective::Decay,
+        },
+        resonators: Vec::new(),
         output_weight,
         integral_weight,
         input_weight,
@@ -495,6 +493,7 @@ fn estimator(
     given: &schema::Estimator,
     disturbance: Option<KnownDisturbance>,
     dims: Dimensions,
+    logs: &Logs,
 ) -> Result<EstimatorSpec, String> {
     let method = match given.method.unwrap_or(defaults::ESTIMATOR) {
         EstimatorMethod::Reference => parameters::EstimatorMethod::Reference,
@@ -518,7 +517,7 @@ fn estimator(
     Ok(EstimatorSpec {
         method,
         response_length,
-        database: database(given)?,
+        database: database(given, logs)?,
         threshold: threshold(given, dims)?,
         debounce,
         adapt: given.adapt.unwrap_or(defaults::ADAPT),
@@ -526,16 +525,38 @@ fn estimator(
     })
 }
 
-fn database(given: &schema::Estimator) -> Result<DatabaseSource, String> {
-    match given.database.as_deref().unwrap_or(defaults::DATABASE) {
-        "commission" => Ok(DatabaseSource::Commission),
-        "model" => Ok(DatabaseSource::Model),
-        other => Err(format!(
-            "estimator.database = \"{}\" is not a known value: {}",
-            crate::design_file::sentence::shorten(other),
-            crate::design_file::suggest::nearest(other, &["commission", "model"])
-        )),
+fn database(given: &schema::Estimator, logs: &Logs) -> Result<DatabaseSource, String> {
+    let is_log = |name: &str| name.to_lowercase().ends_with(".csv");
+    let files = match &given.database {
+        None => return Ok(defaults::DATABASE),
+        Some(NameOrList::Name(name)) if name == "commission" => {
+            return Ok(DatabaseSource::Commission);
+        }
+        Some(NameOrList::Name(name)) if name == "model" => return Ok(DatabaseSource::Model),
+        Some(NameOrList::Name(name)) if !is_log(name) => {
+            return Err(format!(
+                "estimator.database = \"{}\" is not a known value and no CSV file: {}",
+                crate::design_file::sentence::shorten(name),
+                crate::design_file::suggest::nearest(name, &["commission", "model"])
+            ));
+        }
+        Some(files) => files,
+    };
+    if let NameOrList::List(names) = files
+        && let Some(name) = names.iter().find(|name| !is_log(name))
+    {
+        return Err(format!(
+            "estimator.database lists \"{}\": list CSV files only, one per mode",
+            crate::design_file::sentence::shorten(name)
+        ));
     }
+    if !matches!(given.method, None | Some(EstimatorMethod::Reference)) {
+        return Err(
+            "estimator.database names a log, which only method = \"reference\" uses: change one of them"
+                .into(),
+        );
+    }
+    at("estimator.database", logs.read(files)).map(DatabaseSource::Recorded)
 }
 
 fn threshold(given: &schema::Estimator, dims: Dimensions) -> Result<Threshold, String> {

@@ -1,5 +1,6 @@
 //! `export`: zips prebuilt generic binaries with the design as their resource. Nothing is compiled.
 
+use crate::certificate::{self, Certificate};
 use crate::output::Staging;
 use crate::summary;
 use ftc::design::Design;
@@ -87,6 +88,8 @@ pub fn write(design: &Design, staging: Staging) -> Result<String, String> {
         .and_then(|program| program.parent().map(Path::to_path_buf))
         .ok_or("cannot find the directory of this program: start it by its full path")?;
     let resource = serde_json::to_vec(design).map_err(|error| error.to_string())?;
+    let certificate = serde_json::to_vec_pretty(&Certificate::of(design, &resource))
+        .map_err(|error| error.to_string())?;
     let interface = Interface::from(design);
     let mut packed = Vec::new();
     for kind in &KINDS {
@@ -99,6 +102,7 @@ pub fn write(design: &Design, staging: Staging) -> Result<String, String> {
             describe(design, kind, &identifier, &interface, &resource)?.into_bytes(),
         );
         contents.insert("resources/design.json".into(), resource.clone());
+        contents.insert(certificate::PATH.into(), certificate.clone());
         contents.insert(
             "documentation/index.html".into(),
             documentation(design, kind).into_bytes(),

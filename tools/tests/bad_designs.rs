@@ -666,10 +666,10 @@ fn the_estimator() {
             &["response length is 1500", "estimator.response_length"],
         ),
         (
-            "database from a log",
+            "database from a log that is not there",
             "\"commission\"",
             "\"healthy.csv\"",
-            &["estimator.database", "not built yet"],
+            &["estimator.database", "healthy.csv", "cannot be opened"],
         ),
     ]);
 }

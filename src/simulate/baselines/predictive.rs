@@ -15,7 +15,7 @@
 //! the reference, and `P` solves the Riccati equation.
 
 use crate::control::parameters::Limits;
-use crate::plant::SwitchedPlant;
+use crate::plant::{Mode, SwitchedPlant};
 use crate::simulate::closed_loop::{Regulator, Report};
 use crate::simulate::plant::PlantState;
 use clarabel::algebra::CscMatrix;
@@ -52,6 +52,7 @@ pub struct Predictive {
     command: Vec<f64>,
     silent: Vec<f64>,
     calm: Vec<bool>,
+    late: bool,
 }
 
 /// Everything of one mode that can be computed beforehand.
@@ -96,7 +97,28 @@ impl Predictive {
             command: point.u.clone(),
             silent: vec![0.0; dims.outputs],
             calm: vec![false; dims.outputs],
+            late: false,
         })
+    }
+
+    /// The same controller for a loop in which a command acts one sample after it was computed: it
+    /// plans from the state that the command already under way leads to.
+    #[must_use]
+    pub fn one_sample_late(mut self) -> Self {
+        self.late = true;
+        self
+    }
+
+    /// The state from which a command computed now acts.
+    fn starting_point(&self, mode: &Mode) -> DVector<f64> {
+        match self.late {
+            false => self.estimate.clone(),
+            true => {
+                &mode.a * &self.estimate
+                    + &mode.b * DVector::from_column_slice(&self.command)
+                    + mode.state_offset()
+            }
+        }
     }
 
     /// Corrects state and output disturbance with the measurement; a lost sensor corrects nothing.
@@ -117,13 +139,14 @@ impl Predictive {
     fn plan(&mut self, seen: &PlantState) {
         let mode = &self.plant.modes[seen.mode];
         let point = &mode.operating_point;
+        let start = self.starting_point(mode);
         let planner = &mut self.modes[seen.mode];
         let wanted = DVector::from_fn(self.tracked.len(), |i, _| {
             seen.reference[i] - point.y[self.tracked[i]] - self.offset[self.tracked[i]]
         });
         let steady = &planner.target * wanted;
         let n = self.estimate.len();
-        let deviation = &self.estimate - DVector::from_column_slice(&point.x) - steady.rows(0, n);
+        let deviation = start - DVector::from_column_slice(&point.x) - steady.rows(0, n);
         let linear = &planner.from_state * deviation
             + &planner.from_input * steady.rows(n, self.command.len());
         if let Some(step) = planner.first_step(&linear) {

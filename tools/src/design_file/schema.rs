@@ -5,7 +5,7 @@
 //! [`super::defaults`]; what a value must satisfy, in [`super::check`].
 
 use super::signal::{Event, Signal};
-use super::values::NumberOrList;
+use super::values::{NameOrList, NumberOrList};
 use ftc::plant::rectifier::Rectifier;
 use serde::Deserialize;
 
@@ -139,6 +139,8 @@ pub struct Controller {
     pub latency: Option<i64>,
     /// Which guarantee of stability under switching.
     pub lyapunov: Option<LyapunovKind>,
+    /// What the gains are chosen for.
+    pub objective: Option<ObjectiveKind>,
     /// Decay rate per sample.
     pub decay: Option<f64>,
     /// Weight of each tracked output (number or r).
@@ -163,6 +165,16 @@ pub enum LyapunovKind {
     Switched,
     /// One per mode, modes must last.
     Dwell,
+}
+
+/// Values of `controller.objective`.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum ObjectiveKind {
+    /// Least gain from the disturbance to the performance signal (T2).
+    Attenuation,
+    /// Stability with the decay rate only (T1).
+    Decay,
 }
 
 /// `[observer]`.
@@ -195,8 +207,8 @@ pub struct Estimator {
     pub method: Option<EstimatorMethod>,
     /// Past inputs the output remembers, in samples.
     pub response_length: Option<i64>,
-    /// `commission`, `model` or the name of a CSV file.
-    pub database: Option<String>,
+    /// `commission`, `model`, the name of a CSV file, or a list of one per mode.
+    pub database: Option<NameOrList>,
     /// Residual that flags a fault, per sensor (number or p).
     pub threshold: Option<NumberOrList>,
     /// The same in standard deviations of the healthy residual.

@@ -144,7 +144,7 @@ pub fn latency() -> Result<Latency, String> {
     const DECAY: f64 = 0.9;
     let Request { plant, control, .. } = request()?;
     let prompt = synthesise(&plant, &control).map_err(|error| error.to_string())?;
-    let gains = prompt.for_controller().modes;
+    let gains = prompt.for_controller(&plant).modes;
     let ignored = plant.modes.iter().zip(&gains);
     let delayed = |lyapunov| {
         let spec = ControlSpec {
