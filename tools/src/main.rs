@@ -4,6 +4,8 @@
 //! DESIGN.toml ── design_file ──> assemble ──> ftc::design ──┬─> report   (design)
 //!                                                           ├─> export   (two FMUs)
 //!                                                           └─> simulate (trajectories, metrics)
+//!
+//! examples ── reproduce ──> a page, JSON and CSV per experiment of the paper
 //! ```
 
 mod assemble;
@@ -13,6 +15,7 @@ mod failure;
 mod output;
 mod progress;
 mod report;
+mod reproduce;
 mod simulate;
 mod summary;
 
@@ -20,6 +23,7 @@ use clap::{Parser, Subcommand};
 use failure::Failure;
 use ftc::design::Design;
 use progress::Progress;
+use reproduce::Experiment;
 use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
@@ -84,6 +88,19 @@ enum Command {
         #[arg(long, value_name = "DIR")]
         out: PathBuf,
     },
+    /// Run the paper's experiments and write one page each, with the same numbers as JSON and CSV.
+    ///
+    /// paper: its example in every variant, what it says beside what is found, and its figures.
+    /// converter: the AC/DC converter under every kind of sensor fault, against model predictive
+    /// control.
+    #[command(after_help = EXIT_CODES)]
+    Reproduce {
+        /// Which experiment.
+        experiment: Experiment,
+        /// Directory to write to; made if it does not exist.
+        #[arg(long, value_name = "DIR")]
+        out: PathBuf,
+    },
 }
 
 fn main() -> ExitCode {
@@ -127,6 +144,12 @@ fn run(arguments: &Arguments) -> Result<String, Failure> {
             let design = solve(design, &progress)?;
             progress.tell("simulating");
             simulate::write(&design, staging).map_err(Failure::Input)
+        }
+        Command::Reproduce { experiment, out } => {
+            let staging = output::Staging::new(out).map_err(Failure::Input)?;
+            reproduce::write(*experiment, &staging, &progress)
+                .and_then(|text| staging.commit().map(|_| text))
+                .map_err(Failure::Input)
         }
     }
 }
