@@ -5,12 +5,12 @@ PYTHON ?= python3
 VENV := .venv
 IN_VENV := $(VENV)/bin/
 
-.PHONY: build test test-rust test-python demo bench lint clean
+.PHONY: build test test-rust test-python demo bench fuzz soak memcheck lint clean
 
 build:
 	cargo build --release --workspace
 
-test: test-rust test-python
+test: lint test-rust test-python
 
 # In release mode: the design's optimisation problems are solved many times over, and the Python
 # tests need the release binaries anyway.
@@ -25,6 +25,23 @@ demo: build $(VENV)/ready
 
 bench: build
 	cargo bench --workspace
+
+# Fuzzing needs cargo-fuzz and a C++ compiler; SECONDS and TARGETS may be set.
+SECONDS ?= 30
+TARGETS ?= controller_calls plant_calls controller_design plant_design state location
+
+fuzz:
+	cd fmu/fuzz && for target in $(TARGETS); do RUSTC_BOOTSTRAP=1 \
+		cargo fuzz run --fuzz-dir . $$target -- -max_total_time=$(SECONDS) -rss_limit_mb=4096 || exit 1; done
+
+TICKS ?= 100000000
+
+soak:
+	cargo run --release --package fmu-host --example soak -- $(TICKS)
+
+# valgrind's memcheck over the C program of tests/c on both FMUs.
+memcheck: build $(VENV)/ready
+	PYTHONPATH=tests/support $(IN_VENV)python tests/support/c_host.py examples/paper.toml
 
 lint: $(VENV)/ready
 	cargo fmt --all --check

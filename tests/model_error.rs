@@ -79,7 +79,14 @@ fn design(model: &SwitchedPlant, truth: &SwitchedPlant, noise: f64) -> Design {
         estimator: EstimatorSpec {
             method: EstimatorMethod::Reference,
             response_length: Some(RESPONSE),
-            database: DatabaseSource::Recorded(truth.modes.iter().zip(1..).map(log).collect()),
+            database: DatabaseSource::Recorded(
+                truth
+                    .modes
+                    .iter()
+                    .zip(1..)
+                    .map(|drawn| vec![log(drawn)])
+                    .collect(),
+            ),
             threshold: Threshold::Sigmas(6.0),
             debounce: 1,
             adapt: false,

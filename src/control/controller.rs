@@ -10,7 +10,6 @@ use super::observer::{ObservedMode, ObserverState};
 use super::parameters::{Compensation, ControllerParameters, FeedbackGains, Limits};
 use crate::plant::OperatingPoint;
 use crate::state::State;
-use nalgebra::DMatrix;
 use serde::{Deserialize, Serialize};
 
 /// A controller ready to run: immutable, shared by any number of [`ControllerState`]s.
@@ -18,10 +17,6 @@ use serde::{Deserialize, Serialize};
 pub struct Controller {
     parameters: ControllerParameters,
     modes: Vec<ObservedMode>,
-    /// `K_i C_i^+` per mode (m x p), for the printed additive control.
-    static_gains: Vec<DMatrix<f64>>,
-    /// `G_i^+` per mode (q x m), for bumpless switching.
-    integral_inverses: Vec<DMatrix<f64>>,
 }
 
 /// What a tick is told.
@@ -105,25 +100,7 @@ impl Controller {
                 output_offset: mode.output_offset().iter().copied().collect(),
             })
             .collect();
-        let static_gains = parameters
-            .plant
-            .modes
-            .iter()
-            .zip(&parameters.feedback.modes)
-            .map(|(mode, gains)| &gains.state_feedback * pseudo_inverse(&mode.c))
-            .collect();
-        let integral_inverses = parameters
-            .feedback
-            .modes
-            .iter()
-            .map(|gains| pseudo_inverse(&gains.integral))
-            .collect();
-        Self {
-            parameters,
-            modes,
-            static_gains,
-            integral_inverses,
-        }
+        Self { parameters, modes }
     }
 
     /// What this controller was built from.
@@ -235,13 +212,7 @@ impl Controller {
 
     /// Moves the integral part so that the mode just entered repeats the last command.
     fn transfer(&self, state: &mut ControllerState, mode: usize, point: &OperatingPoint) {
-        let Some((gains, inverse)) = self
-            .parameters
-            .feedback
-            .modes
-            .get(mode)
-            .zip(self.integral_inverses.get(mode))
-        else {
+        let Some(gains) = self.parameters.feedback.modes.get(mode) else {
             return;
         };
         kernel::copy(&mut state.excess, &state.command);
@@ -250,7 +221,7 @@ impl Controller {
         for (jump, &new) in state.excess.iter_mut().zip(&state.command) {
             *jump -= new;
         }
-        kernel::add_product(&mut state.integral, inverse, &state.excess);
+        kernel::add_product(&mut state.integral, &gains.integral_inverse, &state.excess);
         kernel::bound(&mut state.integral);
         kernel::copy(&mut state.command, &state.acting);
     }
@@ -272,10 +243,14 @@ impl Controller {
         feedback(state, gains, point);
         if let Some(additive) = &mut state.additive
             && compensate == Compensate::Estimate
-            && let Some(gain) = self.static_gains.get(mode)
         {
             let fault = &state.estimator.fault;
-            additive.add_to(&mut state.command, gain, &gains.integral, fault);
+            additive.add_to(
+                &mut state.command,
+                &gains.output_feedback,
+                &gains.integral,
+                fault,
+            );
             additive.advance(
                 self.parameters.plant.sample_time,
                 &self.parameters.feedback.tracked,
@@ -338,12 +313,4 @@ fn saturate(command: &mut [f64], excess: &mut [f64], limits: &[Limits]) {
         *value = limit.clamp(wanted);
         *taken = *value - wanted;
     }
-}
-
-/// The Moore-Penrose inverse.
-fn pseudo_inverse(matrix: &DMatrix<f64>) -> DMatrix<f64> {
-    let svd = matrix.clone().svd(true, true);
-    let tolerance = 1e-12 * svd.singular_values.max();
-    svd.pseudo_inverse(tolerance)
-        .unwrap_or_else(|_| matrix.transpose() * 0.0)
 }

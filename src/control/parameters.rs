@@ -79,6 +79,12 @@ pub struct FeedbackGains {
     /// Back-calculation gain (q x m): how a saturated command unwinds the integrator.
     #[serde(with = "rows")]
     pub anti_windup: DMatrix<f64>,
+    /// `G_i^+` (q x m): what the integral must move by for a step of the command.
+    #[serde(with = "rows")]
+    pub integral_inverse: DMatrix<f64>,
+    /// `K_i C_i^+` (m x p): what a fault does to the command at once, in the printed control (37).
+    #[serde(with = "rows")]
+    pub output_feedback: DMatrix<f64>,
 }
 
 /// Which observer was designed.

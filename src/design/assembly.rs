@@ -137,13 +137,19 @@ pub fn assemble(request: Request) -> Result<Design, DesignError> {
         &scaling,
     )?;
     let input_limits = limits(&request.signals.inputs);
+    let feedback = feedback(
+        &synthesis.state_feedback,
+        &request.plant,
+        request.bumpless,
+        &input_limits,
+    );
     Ok(Design {
         format: FORMAT,
         name: request.name,
         signals: request.signals,
         controller: ControllerParameters {
             plant: request.plant,
-            feedback: feedback(&synthesis.state_feedback, request.bumpless, &input_limits),
+            feedback,
             observer: synthesis.observer.observer.clone(),
             estimator,
             compensation: request.compensation,
@@ -177,10 +183,11 @@ fn limits(inputs: &[Signal]) -> Vec<Limits> {
 /// the integral by half of what would undo it; inputs without a limit never saturate.
 pub(crate) fn feedback(
     control: &super::StateFeedback,
+    plant: &SwitchedPlant,
     bumpless: bool,
     limits: &[Limits],
 ) -> StateFeedback {
-    let mut feedback = control.for_controller();
+    let mut feedback = control.for_controller(plant);
     feedback.bumpless = bumpless;
     for gains in &mut feedback.modes {
         for (mut column, limit) in gains.anti_windup.column_iter_mut().zip(limits) {

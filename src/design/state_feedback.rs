@@ -67,14 +67,20 @@ impl StateFeedback {
         certificate::verify_state_feedback(plant, self)
     }
 
-    /// What the on-line controller needs of it. The anti-windup gain is `G^+`: the integral is
-    /// pulled back to where the clamped command would have come from.
-    pub fn for_controller(&self) -> parameters::StateFeedback {
-        let modes = self.modes.iter().map(|gains| FeedbackGains {
-            state_feedback: gains.state_feedback.clone(),
-            integral: gains.integral.clone(),
-            previous_input: gains.previous_input.clone(),
-            anti_windup: pseudo_inverse(&gains.integral, 1e-12),
+    /// What the on-line controller needs of it on this plant. Every inverse is taken here, so that
+    /// an FMU only multiplies and adds and gives the same bits on every machine. The anti-windup
+    /// gain is `G^+`: the integral is pulled back to where the clamped command would have come from.
+    pub fn for_controller(&self, plant: &SwitchedPlant) -> parameters::StateFeedback {
+        let modes = self.modes.iter().zip(&plant.modes).map(|(gains, mode)| {
+            let integral_inverse = pseudo_inverse(&gains.integral, 1e-12);
+            FeedbackGains {
+                state_feedback: gains.state_feedback.clone(),
+                integral: gains.integral.clone(),
+                previous_input: gains.previous_input.clone(),
+                anti_windup: integral_inverse.clone(),
+                integral_inverse,
+                output_feedback: &gains.state_feedback * pseudo_inverse(&mode.c, 1e-12),
+            }
         });
         parameters::StateFeedback {
             tracked: self.spec.tracked.clone(),

@@ -105,7 +105,9 @@ pub fn scenario(reference: Waveform, noise: f64, disturbances: usize) -> Scenari
 /// Gains from a linear-quadratic design, rounded by hand; an observer that forgets 80 % a sample.
 pub fn controller(channel: Channel, noise: f64) -> ControllerParameters {
     let plant = plant(channel);
-    let gains = |state_feedback, integral| FeedbackGains {
+    let gains = |state_feedback: DMatrix<f64>, integral: DMatrix<f64>| FeedbackGains {
+        integral_inverse: integral.clone().try_inverse().unwrap(),
+        output_feedback: state_feedback.clone(), // both states are measured
         state_feedback,
         integral,
         previous_input: DMatrix::zeros(2, 0),

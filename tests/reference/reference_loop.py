@@ -70,6 +70,10 @@ class DisturbanceFit:
         self.information = np.linalg.inv(np.linalg.inv(other.information) + doubt**2 * np.eye(len(theta)))
         self.moment = self.information @ theta
 
+    def replace(self, sensor: int, theta: np.ndarray) -> None:
+        """Sets the coefficients of one output."""
+        self.moment[:, sensor] = self.information @ theta
+
     def leverage(self, h: np.ndarray) -> float:
         """Returns the response's variance in units of the noise variance."""
         return float(h @ np.linalg.solve(self.information, h))
@@ -119,6 +123,7 @@ class Estimator:
         self.fits = [DisturbanceFit.empty(harmonics, self.outputs) for _ in self.modes] if harmonics else None
         self.flags = [FaultFlag(self.settings["debounce"]) for _ in range(self.outputs)]
         self.past: list[np.ndarray] = []
+        self.period_seen: list[tuple[np.ndarray, np.ndarray, np.ndarray]] = []
         self.hold = self.length
         self.y_hat = np.zeros(self.outputs)
         self.residual = np.zeros(self.outputs)
@@ -166,9 +171,29 @@ class Estimator:
         unsure = spread > 1.0 + limit and any(flag.up for flag in self.flags)
         trusted = self.hold == 0 and distance <= limit and not unsure
         healthy = self._decide(present, trusted=trusted, widening=math.sqrt(spread))
-        if healthy and self.fits:
-            self.fits[mode].learn(h, y - undisturbed)
+        if self.fits:
+            corrected = self._reconsider(mode, h, y - undisturbed)
+            if healthy and not corrected:
+                self.fits[mode].learn(h, y - undisturbed)
         self.hold = max(self.hold - 1, 0)
+
+    def _reconsider(self, mode: int, h: np.ndarray, d: np.ndarray) -> bool:
+        """Refits accused sensors that, over one period without a hold, showed the disturbance and nothing else."""
+        if self.hold > 0 or not np.isfinite(d).all():
+            self.period_seen.clear()
+            return False
+        self.period_seen.append((np.concatenate([[1.0], h]), d, np.array([flag.up for flag in self.flags])))
+        if len(self.period_seen) < self.settings["harmonics"]["period"]:
+            return False
+        X, D, up = (np.array(column) for column in zip(*self.period_seen, strict=True))
+        self.period_seen.clear()
+        fit = np.linalg.solve(X.T @ X + 1e-6 * np.eye(X.shape[1]), X.T @ D)
+        limits = 0.5 * np.array(self.settings["thresholds"])
+        small = (np.abs(fit[0]) <= limits) & (np.mean((D - X @ fit) ** 2, axis=0) <= limits**2)
+        cleared = np.flatnonzero(small & up.any(axis=0))
+        for sensor in cleared:
+            self.fits[mode].replace(sensor, fit[1:, sensor])
+        return cleared.size > 0
 
     def _decide(self, present: np.ndarray, *, trusted: bool, widening: float) -> bool:
         """Votes on each sensor's flag and sets f_hat; says whether every sensor was judged and found healthy."""
@@ -183,7 +208,8 @@ class Estimator:
                 self.f_hat[i] = 0.0
             elif present[i]:
                 self.f_hat[i] = np.clip(self.residual[i], -largest, largest)
-            all_well = all_well and not flag.up and not beyond
+            quiet = abs(self.residual[i]) <= 0.5 * widening * self.settings["thresholds"][i]
+            all_well = all_well and not flag.up and quiet
         return all_well
 
 

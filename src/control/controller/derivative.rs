@@ -67,24 +67,22 @@ impl Controller {
         let change = &mut trial.acting;
         change.fill(0.0);
         kernel::add_product(change, &gains.state_feedback, estimate);
-        if left != mode
-            && self.parameters.feedback.bumpless
-            && let Some(inverse) = self.integral_inverses.get(mode)
-        {
+        if left != mode && self.parameters.feedback.bumpless {
             // The integral part takes up what the estimate would have moved.
             trial.deviation.fill(0.0);
             kernel::add_scaled(&mut trial.deviation, -1.0, change);
             trial.integral.fill(0.0);
-            kernel::add_product(&mut trial.integral, inverse, &trial.deviation);
+            kernel::add_product(
+                &mut trial.integral,
+                &gains.integral_inverse,
+                &trial.deviation,
+            );
             kernel::add_product(change, &gains.integral, &trial.integral);
         }
-        if trial.additive.is_some()
-            && compensate == Compensate::Estimate
-            && let Some(gain) = self.static_gains.get(mode)
-        {
+        if trial.additive.is_some() && compensate == Compensate::Estimate {
             trial.substitute.fill(0.0);
             kernel::add_scaled(&mut trial.substitute, -1.0, &trial.estimator.fault);
-            kernel::add_product(change, gain, &trial.substitute);
+            kernel::add_product(change, &gains.output_feedback, &trial.substitute);
         }
         let changes = trial.excess.iter().zip(&trial.acting);
         for (command, (&excess, &change)) in trial.command.iter_mut().zip(changes) {

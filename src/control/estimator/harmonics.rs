@@ -67,9 +67,8 @@ impl HarmonicState {
 
     /// Adds the learned response to `outputs` (p).
     pub fn add_response(&self, outputs: &mut [f64]) {
-        let size = self.regressor.len().max(1);
-        for (output, row) in outputs.iter_mut().zip(self.coefficients.chunks_exact(size)) {
-            *output += kernel::dot(row, &self.regressor);
+        for (output, response) in outputs.iter_mut().zip(self.responses()) {
+            *output += response;
         }
     }
 
@@ -84,6 +83,26 @@ impl HarmonicState {
             *value = kernel::dot(row, &self.regressor);
         }
         kernel::dot(&self.direction, &self.regressor).max(0.0)
+    }
+
+    /// The sines and cosines of the last [`rotate`](Self::rotate) (q).
+    pub fn regressor(&self) -> &[f64] {
+        &self.regressor
+    }
+
+    /// The learned response of each sensor.
+    pub fn responses(&self) -> impl Iterator<Item = f64> {
+        let size = self.regressor.len().max(1);
+        let rows = self.coefficients.chunks_exact(size);
+        rows.map(|row| kernel::dot(row, &self.regressor))
+    }
+
+    /// Replaces what was learned of one sensor (q).
+    pub fn replace(&mut self, sensor: usize, waves: &[f64]) {
+        let size = self.regressor.len().max(1);
+        if let Some(row) = self.coefficients.chunks_exact_mut(size).nth(sensor) {
+            kernel::copy(row, waves);
+        }
     }
 
     /// Whether enough was learned to say something of another mode.

@@ -11,12 +11,14 @@ mod decision;
 mod derivative;
 mod harmonics;
 mod predictor;
+mod recovery;
 mod window;
 
 pub use adaptation::Adaptation;
 pub use decision::{Decision, Verdict};
 pub use harmonics::HarmonicState;
 pub use predictor::{InputHistory, leverage};
+pub use recovery::Recovery;
 pub use window::SlidingWindow;
 
 use super::compensation::is_measurement;
@@ -26,6 +28,10 @@ use serde::{Deserialize, Serialize};
 
 /// How many noise deviations a threshold usually is.
 const USUAL_SIGMAS: f64 = 6.0;
+
+/// Only residuals below this share of their threshold are learned from: a fault that grows out of
+/// nothing, or hides just below its threshold, must not be taken for the disturbance.
+const QUIET: f64 = 0.5;
 
 /// One sample as the estimator sees it.
 #[derive(Clone, Copy, Debug)]
@@ -54,6 +60,8 @@ pub struct EstimatorState {
     judged: bool,
     /// Per mode: the learned response to the periodic disturbance.
     harmonics: Vec<HarmonicState>,
+    /// Watches accused sensors for a wrongly learned disturbance.
+    recovery: Option<Recovery>,
     /// Per mode: the adapted response; empty unless adaptation is on.
     adaptations: Vec<Adaptation>,
     decisions: Vec<Decision>,
@@ -73,6 +81,7 @@ crate::state::state!(EstimatorState {
     parts: [
         history,
         harmonics,
+        recovery,
         adaptations,
         decisions,
         window,
@@ -102,6 +111,10 @@ impl EstimatorState {
             hold: estimator.response_length,
             judged: false,
             harmonics,
+            recovery: estimator
+                .harmonics
+                .as_ref()
+                .map(|h| Recovery::new(h, outputs)),
             adaptations: if estimator.adapt {
                 estimator.predictors.iter().map(Adaptation::new).collect()
             } else {
@@ -166,7 +179,8 @@ impl EstimatorState {
         };
         self.judged = widening.is_some();
         let healthy = self.decide(estimator, seen, widening);
-        if healthy {
+        let corrected = self.reconsider(estimator, seen);
+        if healthy && !corrected {
             self.learn(estimator, seen.mode);
         }
         self.hold = self.hold.saturating_sub(1);
@@ -225,6 +239,39 @@ impl EstimatorState {
         }
     }
 
+    /// Replaces what was learned of accused sensors that showed nothing but the disturbance for a
+    /// period; says whether there were any.
+    fn reconsider(&mut self, estimator: &Estimator, seen: &Observation<'_>) -> bool {
+        let (Some(recovery), Some(known)) = (&mut self.recovery, &estimator.harmonics) else {
+            return false;
+        };
+        let Some(learned) = self.harmonics.get_mut(seen.mode) else {
+            return false;
+        };
+        if self.hold > 0 || !seen.y.iter().all(|&value| is_measurement(value)) {
+            recovery.restart();
+            return false;
+        }
+        let unexplained = self
+            .residual
+            .iter()
+            .zip(learned.responses())
+            .map(|(r, wave)| r + wave);
+        let sensors = unexplained.zip(self.flagged.iter().copied());
+        if !recovery.watch(known, learned.regressor(), sensors) {
+            return false;
+        }
+        let mut corrected = false;
+        for (sensor, &threshold) in seen.thresholds.iter().enumerate() {
+            if let Some(waves) = recovery.acquittal(sensor, threshold) {
+                learned.replace(sensor, waves);
+                corrected = true;
+            }
+        }
+        recovery.restart();
+        corrected
+    }
+
     /// The sliding window as printed: leaves the residual; nothing until the window is full.
     fn slide(&mut self, seen: &Observation<'_>) -> Option<f64> {
         let window = self.window.as_mut().filter(|_| self.hold == 0)?;
@@ -238,7 +285,7 @@ impl EstimatorState {
     }
 
     /// Decides sensor by sensor; `widening` is absent when the residual means nothing now.
-    /// Returns whether the residual was judged and every sensor found healthy.
+    /// Returns whether the residual was judged and every sensor found healthy beyond suspicion.
     fn decide(
         &mut self,
         estimator: &Estimator,
@@ -272,7 +319,8 @@ impl EstimatorState {
                 (true, Verdict::Lost) => *fault,
                 (true, _) => residual.clamp(-largest, largest),
             };
-            healthy &= !*flagged && verdict == Verdict::Healthy;
+            let quiet = widening.is_some_and(|factor| residual.abs() <= QUIET * factor * threshold);
+            healthy &= !*flagged && verdict == Verdict::Healthy && quiet;
         }
         healthy
     }

@@ -25,6 +25,7 @@ pub fn additive(design: &Design) -> Result<ControllerParameters, DesignError> {
     parameters.compensation = Compensation::Additive;
     parameters.feedback = feedback(
         &control,
+        plant,
         design.controller.feedback.bumpless,
         &parameters.input_limits,
     );

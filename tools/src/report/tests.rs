@@ -69,6 +69,8 @@ fn lags(outputs: usize, disturbances: usize, steps: u64) -> Design {
         integral: &square * 0.2,
         previous_input: DMatrix::zeros(outputs, 0),
         anti_windup: DMatrix::zeros(outputs, outputs),
+        integral_inverse: &square * 5.0,
+        output_feedback: &square * -0.1,
     };
     let nothing = Gain(DMatrix::zeros(outputs, outputs));
     let plant = SwitchedPlant {

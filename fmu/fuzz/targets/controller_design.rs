@@ -1,0 +1,9 @@
+//! Forged designs for the controller.
+
+#![no_main]
+
+use fmu_fuzz::design::{Edit, forge};
+use ftc_controller::ControllerFmu;
+use libfuzzer_sys::fuzz_target;
+
+fuzz_target!(|edits: Vec<Edit>| forge::<ControllerFmu>("ftc_controller", &edits));

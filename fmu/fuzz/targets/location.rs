@@ -1,0 +1,9 @@
+//! Any text as the location of the resources.
+
+#![no_main]
+
+use libfuzzer_sys::fuzz_target;
+
+fuzz_target!(|location: &str| {
+    let _ = fmu_abi::resource::folder(location);
+});

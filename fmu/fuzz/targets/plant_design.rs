@@ -1,0 +1,9 @@
+//! Forged designs for the plant.
+
+#![no_main]
+
+use fmu_fuzz::design::{Edit, forge};
+use ftc_plant::PlantFmu;
+use libfuzzer_sys::fuzz_target;
+
+fuzz_target!(|edits: Vec<Edit>| forge::<PlantFmu>("ftc_plant", &edits));

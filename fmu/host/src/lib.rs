@@ -1,0 +1,20 @@
+//! An importer in Rust, for tests, measurements and fuzzing: it loads a binary (or uses the one
+//! linked into the program), makes instances, and closes the loop of controller and plant.
+//!
+//! It fails loudly: whatever must succeed is asserted.
+
+mod closed_loop;
+mod counting;
+mod exercise;
+mod functions;
+mod instance;
+pub mod model;
+pub mod random_calls;
+
+pub use closed_loop::{Coupling, Loop};
+pub use counting::{Counting, allocations};
+pub use exercise::exercise;
+pub use fmu_abi::types;
+pub use functions::{Functions, Library};
+pub use instance::{Instance, Messages};
+pub use model::Model;

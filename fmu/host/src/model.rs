@@ -1,0 +1,114 @@
+//! Unpacked FMUs: the paper's example with gains made by hand, so that no solver is needed.
+
+#[path = "../../../tests/common/mod.rs"]
+mod common;
+
+use common::Channel;
+use ftc::control::{Compensate, Controller, Sample};
+use ftc::design::{Design, FORMAT, Signal, Signals};
+use ftc::simulate::plant::External;
+use ftc::simulate::{PlantSimulator, Truth};
+use model_description::{CONTROLLER, Interface, PLANT, VariableTable};
+use std::path::Path;
+use tempfile::TempDir;
+
+/// A folder of resources, removed when dropped, and what the XML would tell of it.
+#[derive(Debug)]
+pub struct Model {
+    /// The resources.
+    pub folder: TempDir,
+    /// Their fingerprint.
+    pub guid: String,
+    /// The variables.
+    pub table: VariableTable,
+}
+
+impl Model {
+    /// The controller of a design.
+    pub fn controller(design: &Design) -> Self {
+        Self::unpacked(design, CONTROLLER, model_description::controller)
+    }
+
+    /// The plant of a design.
+    pub fn plant(design: &Design) -> Self {
+        Self::unpacked(design, PLANT, model_description::plant)
+    }
+
+    fn unpacked(design: &Design, identifier: &str, table: fn(&Interface) -> VariableTable) -> Self {
+        let folder = tempfile::tempdir().expect("a folder for the resources");
+        let bytes = serde_json::to_vec(design).expect("a design is plain data");
+        std::fs::write(folder.path().join("design.json"), &bytes).expect("the folder is writable");
+        Self {
+            folder,
+            guid: model_description::guid(identifier, &bytes),
+            table: table(&Interface::from(design)),
+        }
+    }
+
+    /// The folder as an importer names it.
+    pub fn location(&self) -> String {
+        location(self.folder.path())
+    }
+}
+
+/// A folder as a URI.
+pub fn location(folder: &Path) -> String {
+    format!("file://{}", folder.display())
+}
+
+/// The paper's example under noise, its modes switched at half time.
+pub fn example() -> Design {
+    let controller = common::controller(Channel::State, 0.005);
+    let signals = |base: &str| -> Vec<Signal> {
+        let signal = |at| Signal {
+            name: format!("{base}[{at}]"),
+            unit: None,
+            nominal: 1.0,
+            min: None,
+            max: None,
+        };
+        (1..=2).map(signal).collect()
+    };
+    Design {
+        format: FORMAT,
+        name: "paper".into(),
+        signals: Signals {
+            inputs: signals("u"),
+            outputs: signals("y"),
+            states: signals("x"),
+        },
+        scenario: common::scenario(common::reference("square"), 0.005, 1),
+        controller,
+        truth: Truth::default(),
+        synthesis: None,
+    }
+}
+
+/// Measurement and command of the native loop, controller first, at each of `ticks` ticks.
+pub fn native(design: &Design, ticks: usize) -> Vec<(Vec<f64>, Vec<f64>)> {
+    let controller = Controller::new(design.controller.clone());
+    let plant = PlantSimulator::new(design.controller.plant.clone(), design.scenario.clone());
+    let (mut state, mut seen) = (controller.initial_state(0), plant.initial_state());
+    let external = External {
+        fault: &[0.0; 2],
+        disturbance: &[0.0],
+        mode: None,
+        noise: true,
+    };
+    let tick = |_| {
+        plant.observe(&mut seen, &external);
+        let sample = Sample {
+            tick: seen.tick,
+            mode: seen.mode,
+            measurement: &seen.y,
+            reference: &seen.reference,
+            thresholds: &design.controller.estimator.thresholds,
+            compensate: Compensate::Estimate,
+        };
+        controller.tick(&mut state, &sample);
+        let row = (seen.y.clone(), state.command.clone());
+        plant.advance(&mut seen, &row.1);
+        row
+    };
+    (0..ticks).map(tick).collect()
+}

@@ -1,0 +1,95 @@
+//! Resources that are not those of the FMU: one sentence in the log, and no instance.
+
+use crate::Pair;
+use fmu_host::model::location;
+use fmu_host::{Instance, Model};
+use std::fs;
+
+/// What the log says when the resource of binary 0 or 1 is `bytes`, under the model's own guid.
+fn refusal(pair: &Pair, which: usize, bytes: Option<&[u8]>) -> String {
+    let folder = tempfile::tempdir().unwrap();
+    if let Some(bytes) = bytes {
+        fs::write(folder.path().join("design.json"), bytes).unwrap();
+    }
+    let model = &pair.models[which];
+    sentence(Instance::made(
+        pair.functions()[which],
+        model,
+        &model.guid,
+        &location(folder.path()),
+    ))
+}
+
+fn sentence(made: Result<Instance, String>) -> String {
+    let Err(message) = made else {
+        panic!("an instance was made");
+    };
+    assert!(message.starts_with("fmi2Instantiate: "), "{message}");
+    assert_eq!(message.lines().count(), 1, "{message}");
+    message
+}
+
+fn design(model: &Model) -> Vec<u8> {
+    fs::read(model.folder.path().join("design.json")).unwrap()
+}
+
+#[test]
+fn missing_empty_truncated_and_damaged_designs_are_refused() {
+    let pair = Pair::load();
+    for which in [0, 1] {
+        let good = design(&pair.models[which]);
+        assert!(refusal(&pair, which, None).contains("cannot read"));
+        for length in [0, 1, good.len() / 2, good.len() - 1] {
+            let message = refusal(&pair, which, Some(&good[..length]));
+            assert!(message.contains("does not belong to this FMU"), "{message}");
+        }
+        for bit in (0..8 * good.len()).step_by(good.len() / 4) {
+            let mut damaged = good.clone();
+            damaged[bit / 8] ^= 1 << (bit % 8);
+            let message = refusal(&pair, which, Some(&damaged));
+            assert!(message.contains("does not belong to this FMU"), "{message}");
+        }
+    }
+}
+
+/// A design that fits its guid, as somebody who forges both could make it.
+#[test]
+fn designs_of_another_layout_or_of_other_sizes_are_refused() {
+    let pair = Pair::load();
+    let text = String::from_utf8(design(&pair.models[0])).unwrap();
+    let forgeries = [
+        text.replacen("\"format\":1", "\"format\":2", 1),
+        text.replacen("\"tracked\":[0,1]", "\"tracked\":[0,7]", 1),
+        text.replacen("\"noise\":[0.005,0.005]", "\"noise\":[0.005]", 1),
+        "{}".to_string(),
+        "[".repeat(1_000_000),
+    ];
+    for forged in forgeries {
+        assert_ne!(forged, text);
+        let binaries = ["ftc_controller", "ftc_plant"];
+        for (which, binary) in binaries.into_iter().enumerate() {
+            let folder = tempfile::tempdir().unwrap();
+            fs::write(folder.path().join("design.json"), &forged).unwrap();
+            let guid = model_description::guid(binary, forged.as_bytes());
+            let location = location(folder.path());
+            let made = Instance::made(
+                pair.functions()[which],
+                &pair.models[which],
+                &guid,
+                &location,
+            );
+            assert!(sentence(made).contains("design"));
+        }
+    }
+}
+
+/// A zip made by hand: the XML of one FMU, the binary of the other, one design.
+#[test]
+fn the_binary_of_another_fmu_is_refused() {
+    let pair = Pair::load();
+    let [controller, plant] = pair.functions();
+    for (functions, model) in [(plant, &pair.models[0]), (controller, &pair.models[1])] {
+        let message = sentence(Instance::new(functions, model));
+        assert!(message.contains("does not belong to this FMU"), "{message}");
+    }
+}
