@@ -112,10 +112,11 @@ fn closed_loop(
     let (m, n) = gains.state_feedback.shape();
     let previous = gains.previous_input.ncols();
     let mut gain = DMatrix::zeros(m, model.a.nrows());
+    let integral_part = spec.integral_size();
     gain.columns_mut(0, n).copy_from(&gains.state_feedback);
     gain.columns_mut(n, previous)
         .copy_from(&gains.previous_input);
-    gain.columns_mut(n + previous, spec.tracked.len())
+    gain.columns_mut(n + previous, integral_part)
         .copy_from(&gains.integral);
     (model.a + model.b * &gain, model.e, model.h + model.d * gain)
 }

@@ -4,6 +4,9 @@
 //! every inequality from the plant and the shipped gains with a bound on each rounding error made
 //! on the way ([`Enclosure`]), and proves it positive definite. No solver takes part.
 //!
+//! Sine and cosine of a resonator count as known to one unit in the last place, which covers the
+//! doubles the controller turns by as well as the numbers they stand for.
+//!
 //! For gains `K~` and the closed loop `A_i + B_i K~_i` the inequalities are (T2) with `R = K~ G` and
 //! `G_i = S_i`, which the solver's solution implies for every `G_i`.
 //!
@@ -19,7 +22,7 @@ use super::observer::ObserverDesign;
 use super::state_feedback::{ModeGains, StateFeedback};
 use super::units::power_of_two;
 use super::verdict::{BlockKind, BlockName};
-use super::{DwellTime, Lyapunov, Units};
+use super::{ControlSpec, DwellTime, Lyapunov, Units};
 use crate::control::parameters::Gain;
 use crate::plant::{Dimensions, SwitchedPlant};
 use crate::rows;
@@ -181,7 +184,7 @@ pub(crate) fn verify_state_feedback(
     let loops: Vec<ClosedLoop> = augment(plant, spec, units)
         .into_iter()
         .zip(&design.modes)
-        .map(|(model, gains)| ClosedLoop::new(model, scaled_gain(gains, units, spec.latency)))
+        .map(|(model, gains)| ClosedLoop::new(model, scaled_gain(gains, units, spec)))
         .collect();
     let coordinates = coordinates(&certificate.lyapunov)?;
     let lyapunov = |mode: usize| &coordinates[spec.lyapunov.index(mode)];
@@ -278,19 +281,20 @@ fn check_dwell(dwell: &DwellTime, decay: f64, sample_time: f64) -> Result<(), Ce
 }
 
 /// `K~ = [K, K_u, G]` in the certificate's units.
-fn scaled_gain(gains: &ModeGains, units: &Units, latency: usize) -> DMatrix<f64> {
+fn scaled_gain(gains: &ModeGains, units: &Units, spec: &ControlSpec) -> DMatrix<f64> {
     let m = units.inputs.len();
-    let previous = if latency == 0 { 0 } else { m };
-    let (n, r) = (units.states.len(), units.integrators.len());
-    let mut gain = DMatrix::zeros(m, n + previous + r);
+    let previous = if spec.latency == 0 { 0 } else { m };
+    let (n, integral_part) = (units.states.len(), units.integral_part(spec));
+    let mut gain = DMatrix::zeros(m, n + previous + integral_part.len());
     gain.columns_mut(0, n)
         .copy_from(&scaled(&gains.state_feedback, &units.inputs, &units.states));
-    if latency == 1 {
+    if spec.latency == 1 {
         let block = scaled(&gains.previous_input, &units.inputs, &units.inputs);
         gain.columns_mut(n, m).copy_from(&block);
     }
-    let integral = scaled(&gains.integral, &units.inputs, &units.integrators);
-    gain.columns_mut(n + previous, r).copy_from(&integral);
+    let integral = scaled(&gains.integral, &units.inputs, &integral_part);
+    gain.columns_mut(n + previous, integral_part.len())
+        .copy_from(&integral);
     gain
 }
 
@@ -473,11 +477,12 @@ fn check_sizes(plant: &SwitchedPlant, design: &StateFeedback) -> Result<(), Cert
     spec.check(dims).map_err(malformed)?;
     let (n, m, r) = (dims.states, dims.inputs, spec.tracked.len());
     let (modes, previous) = (plant.modes.len(), spec.latency * m);
-    let size = n + previous + r;
+    let q = spec.integral_size();
+    let size = n + previous + q;
     let gains_fit = design.modes.len() == modes
         && design.modes.iter().all(|gains| {
             gains.state_feedback.shape() == (m, n)
-                && gains.integral.shape() == (m, r)
+                && gains.integral.shape() == (m, q)
                 && gains.previous_input.shape() == (m, previous)
         });
     let matrices_fit = certificate.lyapunov.len() == spec.lyapunov.matrices(modes)

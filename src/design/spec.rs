@@ -2,6 +2,7 @@
 
 use super::Lyapunov;
 use crate::plant::Dimensions;
+use core::f64::consts::{PI, TAU};
 use serde::{Deserialize, Serialize};
 
 /// The state feedback that is asked for.
@@ -17,9 +18,14 @@ pub struct ControlSpec {
     pub decay: f64,
     /// What is optimised.
     pub objective: Objective,
+    /// Angle per sample (radians, between 0 and pi) of each resonator of the internal model: the
+    /// tracking error vanishes at these frequencies too. None without an internal model.
+    #[serde(default)]
+    pub resonators: Vec<f64>,
     /// `W_y`: weight of each tracked output (r), per physical unit.
     pub output_weight: Vec<f64>,
-    /// `W_z`: weight of each integrator state (r), per physical unit times second.
+    /// `W_z`: weight of each integrator state (r), per physical unit times second; also that of both
+    /// states of each resonator of the same output.
     pub integral_weight: Vec<f64>,
     /// `W_u`: weight of each input (m), per physical unit.
     pub input_weight: Vec<f64>,
@@ -46,10 +52,17 @@ impl ControlSpec {
             lyapunov: Lyapunov::Common,
             decay: 1.0,
             objective: Objective::Attenuation,
+            resonators: Vec::new(),
             output_weight: vec![1.0; r],
             integral_weight: vec![1.0; r],
             input_weight: vec![1.0; dims.inputs],
         }
+    }
+
+    /// Size `q` of the integral part: one integrator per tracked output, and two states per tracked
+    /// output and resonator.
+    pub fn integral_size(&self) -> usize {
+        self.tracked.len() * (1 + 2 * self.resonators.len())
     }
 
     /// Says in one sentence what is wrong with the request.
@@ -83,6 +96,7 @@ impl ControlSpec {
             return Err(format!("latency is {}: give 0 or 1 samples", self.latency));
         }
         check_decay("decay", self.decay, self.lyapunov)?;
+        check_resonators(&self.resonators)?;
         for (name, weights, size) in [
             ("output_weight", &self.output_weight, r),
             ("integral_weight", &self.integral_weight, r),
@@ -100,6 +114,35 @@ impl ControlSpec {
         }
         Ok(())
     }
+}
+
+/// Angles between resonators, and between a resonator and the integrator (0) or the highest
+/// frequency there is (pi), below which no gains could tell them apart in double precision.
+const CLOSEST_ANGLES: f64 = 1e-3;
+
+/// Every resonator's angle lies between 0 and pi and keeps its distance from both and from the others.
+fn check_resonators(angles: &[f64]) -> Result<(), String> {
+    let room = CLOSEST_ANGLES..=PI - CLOSEST_ANGLES;
+    for (index, angle) in angles.iter().enumerate() {
+        let harmonic = index + 1;
+        if !room.contains(angle) {
+            let samples = TAU / angle;
+            return Err(format!(
+                "the internal model cannot hold harmonic {harmonic} of the disturbance, whose period is {samples:.6} samples: \
+                 choose a sample_time at which it lies between {:.4} and {:.0} samples, or use fewer harmonics or none \
+                 (internal_model = false)",
+                TAU / room.end(),
+                TAU / room.start()
+            ));
+        }
+        let near = |other: &f64| (other - angle).abs() < CLOSEST_ANGLES;
+        if angles[..index].iter().any(near) {
+            return Err(format!(
+                "resonator {harmonic} turns by {angle} radians per sample, as an earlier one does: name each frequency once"
+            ));
+        }
+    }
+    Ok(())
 }
 
 /// A decay rate lies in (0, 1]; strictly below 1 where a dwell time must come out of it.

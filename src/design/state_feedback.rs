@@ -28,7 +28,8 @@ pub struct ModeGains {
     /// `K_i` (m x n), multiplies the deviation of the state from the operating point.
     #[serde(with = "rows")]
     pub state_feedback: DMatrix<f64>,
-    /// `G_i` (m x r), multiplies the integral of the tracking error.
+    /// `G_i` (m x q), multiplies the integral part: the integrals of the tracking error, then the
+    /// resonators (`q = r` without an internal model).
     #[serde(with = "rows")]
     pub integral: DMatrix<f64>,
     /// Multiplies the command that is acting now (m x m); no columns without latency.
@@ -85,7 +86,7 @@ impl StateFeedback {
         parameters::StateFeedback {
             tracked: self.spec.tracked.clone(),
             latency: self.spec.latency,
-            resonators: Vec::new(),
+            resonators: self.spec.resonators.clone(),
             bumpless: false,
             modes: modes.collect(),
         }

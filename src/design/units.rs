@@ -17,7 +17,8 @@ pub struct Units {
     pub inputs: Vec<f64>,
     /// Outputs (p).
     pub outputs: Vec<f64>,
-    /// Integrator states (r): near `Te` times the unit of the tracked output.
+    /// Integrator states (r): near `Te` times the unit of the tracked output; also the unit of the
+    /// resonators of that output.
     pub integrators: Vec<f64>,
     /// Disturbances, one unit for all.
     pub disturbance: f64,
@@ -60,6 +61,13 @@ impl Units {
         units.disturbance = 1.0 / power_of_two(disturbance);
         units.performance = power_of_two(performance);
         units
+    }
+
+    /// The unit of each state of the integral part (q entries), in the order of the augmented model.
+    pub fn integral_part(&self, spec: &ControlSpec) -> Vec<f64> {
+        let pairs = self.integrators.iter().flat_map(|&unit| [unit; 2]);
+        let resonators = spec.resonators.iter().flat_map(|_| pairs.clone());
+        self.integrators.iter().copied().chain(resonators).collect()
     }
 
     /// Whether there is one positive power of two per signal, as exact scaling needs.

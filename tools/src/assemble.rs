@@ -6,7 +6,7 @@ use crate::design_file::check;
 use crate::design_file::defaults;
 use crate::design_file::schema::{
     self, CompensationMethod, DesignFile, EstimatorMethod, LyapunovKind, ObjectiveKind,
-    ObserverKind, SignalInfo,
+    ObserverKind, PlantModel, SignalInfo,
 };
 use crate::design_file::signal::Signal as SignalOverTime;
 use crate::design_file::values::{NameOrList, NumberOrList};
@@ -16,8 +16,8 @@ use ftc::design::assembly::{DatabaseSource, EstimatorSpec, KnownDisturbance, Req
 use ftc::design::{ControlSpec, Lyapunov, Objective, ObserverSpec, Signal, Signals};
 use ftc::plant::{Dimensions, Mode, OperatingPoint, SwitchedPlant};
 use ftc::rows;
-use ftc::simulate::Scenario;
 use ftc::simulate::scenario::{ModeInterval, Waveform};
+use ftc::simulate::{Scenario, Truth};
 use nalgebra::DMatrix;
 use std::path::Path;
 
@@ -64,6 +64,7 @@ pub fn request(file: &DesignFile, folder: &Path) -> Result<Request, String> {
         name: file.name.clone(),
         signals,
         plant,
+        truth: truth(file),
         control,
         bumpless: file.controller.bumpless.unwrap_or(defaults::BUMPLESS),
         observer,
@@ -88,8 +89,58 @@ fn refuse_unbuilt(file: &DesignFile) -> Result<(), String> {
     }
 }
 
+/// What is simulated: the modes themselves, or the named model they are linearised from.
+fn truth(file: &DesignFile) -> Truth {
+    match &file.plant {
+        None => Truth::AsDesigned,
+        Some(PlantModel::Rectifier(rectifier)) => Truth::Rectifier(rectifier.clone()),
+    }
+}
+
+/// The modes of a named model: its linearisations.
+fn linearised(model: &PlantModel, sample_time: f64) -> Result<SwitchedPlant, String> {
+    let PlantModel::Rectifier(rectifier) = model;
+    let values = [
+        ("inductance", rectifier.inductance),
+        ("resistance", rectifier.resistance),
+        ("capacitance", rectifier.capacitance),
+        ("phase_voltage", rectifier.phase_voltage),
+        ("current_loop", rectifier.current_loop),
+        ("dc_voltage", rectifier.dc_voltage),
+    ];
+    for (key, value) in values {
+        at(&format!("plant.{key}"), check::positive(value))?;
+    }
+    at(
+        "plant.loads",
+        check::each(&rectifier.loads, check::positive),
+    )?;
+    if rectifier.loads.is_empty() || rectifier.loads.len() > LARGEST_SIZE {
+        return Err(format!(
+            "plant.loads has {} entries: give 1 to {LARGEST_SIZE}, one per mode",
+            rectifier.loads.len()
+        ));
+    }
+    at("plant:", rectifier.linearise(sample_time))
+}
+
 fn plant(file: &DesignFile) -> Result<SwitchedPlant, String> {
     at("sample_time", check::positive(file.sample_time))?;
+    match (&file.plant, file.modes.is_empty()) {
+        (Some(model), true) => return linearised(model, file.sample_time),
+        (Some(_), false) => {
+            return Err(
+                "[plant] and [[mode]] exclude each other: a named model brings its own modes"
+                    .into(),
+            );
+        }
+        (None, true) => {
+            return Err(
+                "mode is missing: add at least one [[mode]], or a [plant] with a model".into(),
+            );
+        }
+        (None, false) => {}
+    }
     if file.modes.len() > LARGEST_SIZE {
         return Err(format!(
             "mode: there are {} modes: give at most {LARGEST_SIZE}",
@@ -323,6 +374,7 @@ fn control(
             ObjectiveKind::Attenuation => Objective::Attenuation,
             ObjectiveKind::Decay => Objective::Decay,
         },
+        resonators: Vec::new(),
         output_weight,
         integral_weight,
         input_weight,

@@ -5,6 +5,8 @@
 //!                                                           ├─> export   (two FMUs)
 //!                                                           └─> simulate (trajectories, metrics)
 //!                                         FMU ──────────────────> verify (the proof, once more)
+//!
+//! examples ── reproduce ──> a page, JSON and CSV per experiment of the paper
 //! ```
 
 mod as_printed;
@@ -18,6 +20,7 @@ mod healthy_log;
 mod output;
 mod progress;
 mod report;
+mod reproduce;
 mod simulate;
 mod summary;
 mod verify;
@@ -27,6 +30,7 @@ use failure::Failure;
 use ftc::design::Design;
 use ftc::design::assembly::Request;
 use progress::Progress;
+use reproduce::Experiment;
 use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
@@ -114,6 +118,19 @@ enum Command {
         #[arg(long)]
         baselines: bool,
     },
+    /// Run the paper's experiments and write one page each, with the same numbers as JSON and CSV.
+    ///
+    /// paper: its example in every variant, what it says beside what is found, and its figures.
+    /// converter: the AC/DC converter under every kind of sensor fault, against model predictive
+    /// control.
+    #[command(after_help = EXIT_CODES)]
+    Reproduce {
+        /// Which experiment.
+        experiment: Experiment,
+        /// Directory to write to; made if it does not exist.
+        #[arg(long, value_name = "DIR")]
+        out: PathBuf,
+    },
 }
 
 fn main() -> ExitCode {
@@ -169,6 +186,12 @@ fn run(arguments: &Arguments) -> Result<String, Failure> {
             let design = solve(design, &progress)?;
             progress.tell("simulating");
             simulate::write(&design, *baselines, staging).map_err(Failure::Input)
+        }
+        Command::Reproduce { experiment, out } => {
+            let staging = output::Staging::new(out).map_err(Failure::Input)?;
+            reproduce::write(*experiment, &staging, &progress)
+                .and_then(|text| staging.commit().map(|_| text))
+                .map_err(Failure::Input)
         }
     }
 }

@@ -7,7 +7,6 @@
 
 use crate::design::augmented::AugmentedMode;
 use crate::design::certificate::FactoredLyapunov;
-use crate::plant::spectral_radius;
 use nalgebra::DMatrix;
 
 /// Gains and Lyapunov matrix of one mode.
@@ -60,31 +59,25 @@ impl Frame {
         })
     }
 
-    /// Coordinates in which the inputs reach every direction about equally, from the mean of the
-    /// modes' reachability Gramians over `REACH` samples: at small sample times the plain margin
-    /// problem hardly sees the states far from the inputs. `None` when some are not reached at all.
-    pub fn of_reachable(models: &[AugmentedMode], group: &[usize]) -> Option<Self> {
-        const REACH: usize = 500;
-        let gramian = |model: &AugmentedMode| {
-            let shrink = 1.0 / spectral_radius(&model.a).max(1.0);
-            let mut reached = model.b.clone();
-            let mut sum = &reached * reached.transpose();
-            for _ in 0..REACH {
-                reached = shrink * (&model.a * reached);
-                sum += &reached * reached.transpose();
-            }
-            let scale = sum.nrows() as f64 / sum.trace();
-            sum * scale
-        };
-        let parts: Vec<Part> = group
-            .iter()
-            .map(|&mode| Part {
+    /// Coordinates in which linear-quadratic regulators of the modes, each with a decay somewhat faster
+    /// than asked, have the identity as their mean Lyapunov matrix. A single mode shows a margin in
+    /// them whenever it can be stabilised so, however badly its states are scaled. `None` when a
+    /// regulator does not exist.
+    pub fn of_regulated(models: &[AugmentedMode], group: &[usize], decay: f64) -> Option<Self> {
+        const HASTE: f64 = 1.3;
+        let faster = decay.min(0.999).powf(HASTE);
+        let part = |&mode: &usize| {
+            let model = &models[mode];
+            let cost = regulator_cost(&(&model.a / faster), &(&model.b / faster))?;
+            let lyapunov = cost.cholesky()?.inverse();
+            let symmetric = 0.5 * (&lyapunov + lyapunov.transpose());
+            Some(Part {
                 mode,
-                gain: models[mode].b.transpose(),
-                lyapunov: FactoredLyapunov::plain(gramian(&models[mode])),
+                gain: model.b.transpose(),
+                lyapunov: FactoredLyapunov::plain(symmetric),
             })
-            .collect();
-        Self::of(&parts)
+        };
+        Self::of(&group.iter().map(part).collect::<Option<Vec<_>>>()?)
     }
 
     /// Coordinates from a stabilising solution, with the units in which disturbance and closed-loop
@@ -156,4 +149,30 @@ impl Frame {
         };
         parts.into_iter().map(back).collect()
     }
+}
+
+/// The cost matrix `P` of the regulator of `x+ = a x + b u` that minimises the sum of `x'x + u'u`, by
+/// the doubling algorithm for the discrete Riccati equation; `None` where it does not converge.
+fn regulator_cost(a: &DMatrix<f64>, b: &DMatrix<f64>) -> Option<DMatrix<f64>> {
+    const DOUBLINGS: usize = 40;
+    let identity = DMatrix::<f64>::identity(a.nrows(), a.nrows());
+    let (mut transition, mut reach, mut cost) = (a.clone(), b * b.transpose(), identity.clone());
+    for _ in 0..DOUBLINGS {
+        let shared = (&identity + &reach * &cost).try_inverse()?;
+        let carried = &transition * shared;
+        let growth = transition.transpose()
+            * &cost
+            * (&identity + &reach * &cost).lu().solve(&transition)?;
+        reach += &carried * &reach * transition.transpose();
+        transition = &carried * transition;
+        cost += &growth;
+        cost = 0.5 * (&cost + cost.transpose());
+        if !cost.iter().all(|value| value.is_finite()) {
+            return None;
+        }
+        if growth.norm() <= 1e-12 * cost.norm() {
+            return Some(cost);
+        }
+    }
+    None
 }

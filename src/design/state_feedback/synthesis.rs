@@ -81,7 +81,7 @@ pub(super) fn is_feasible(plant: &SwitchedPlant, spec: &ControlSpec, scaling: &S
 }
 
 /// Stabilising gains of a group with their margin, sought in the design's coordinates and, where
-/// these show none, in reachability coordinates; no gains where neither does.
+/// these show none, in those of a regulator; no gains where neither does.
 fn stable(
     models: &[AugmentedMode],
     spec: &ControlSpec,
@@ -91,11 +91,47 @@ fn stable(
     if margin.margin >= SMALLEST_MARGIN {
         return Ok((margin, Some(parts)));
     }
-    let again = Frame::of_reachable(models, group).and_then(|frame| {
-        let (margin, parts) = theorem::stabilise(&frame.view(models), spec, group).ok()?;
-        (margin.margin >= 1e3 * SMALLEST_MARGIN).then(|| (margin, Some(frame.restore(parts))))
-    });
-    Ok(again.unwrap_or((margin, None)))
+    let again = Frame::of_regulated(models, group, spec.decay)
+        .and_then(|frame| surely_stable(&frame, models, spec, group));
+    Ok(match again {
+        Some((margin, parts)) => (margin, Some(parts)),
+        None => (margin, None),
+    })
+}
+
+/// Stabilising gains with a margin beyond doubt, sought in given coordinates.
+fn surely_stable(
+    frame: &Frame,
+    models: &[AugmentedMode],
+    spec: &ControlSpec,
+    group: &[usize],
+) -> Option<(Margin, Vec<Part>)> {
+    let (margin, parts) = theorem::stabilise(&frame.view(models), spec, group).ok()?;
+    (margin.margin >= 1e3 * SMALLEST_MARGIN).then(|| (margin, frame.restore(parts)))
+}
+
+/// The gains solved for again in the coordinates they suggest, as long as the margin is thin and
+/// doubles.
+fn thickened(
+    models: &[AugmentedMode],
+    spec: &ControlSpec,
+    group: &[usize],
+    mut margin: Margin,
+    mut parts: Vec<Part>,
+) -> (Margin, Vec<Part>) {
+    for _ in 0..REFRAMINGS {
+        let frame = Frame::of_stabilised(models, &parts);
+        let Some(frame) = frame.filter(|_| margin.margin < THICK_MARGIN) else {
+            break;
+        };
+        match theorem::stabilise(&frame.view(models), spec, group) {
+            Ok((better, found)) if better.margin > 2.0 * margin.margin => {
+                (margin, parts) = (better, frame.restore(found));
+            }
+            _ => break,
+        }
+    }
+    (margin, parts)
 }
 
 /// Whether a group of modes can be stabilised as asked.
@@ -118,28 +154,14 @@ impl Road<'_> {
         self.spec.lyapunov.groups(self.models.len())
     }
 
-    /// Stabilising gains of a group (T1): solved, and solved again in the coordinates the solution
-    /// suggests as long as its margin is thin and doubles.
+    /// Stabilising gains of a group (T1).
     fn stabilised(&self, group: &[usize]) -> Result<Verdict, SolverFailure> {
-        let (margin, mut parts) = match stable(&self.models, self.spec, group)? {
-            (margin, Some(parts)) => (margin, parts),
-            (margin, None) => return Ok(Verdict::Conflict(margin)),
-        };
-        let mut thickness = margin.margin;
-        for _ in 0..REFRAMINGS {
-            let frame = Frame::of_stabilised(&self.models, &parts);
-            let Some(frame) = frame.filter(|_| thickness < THICK_MARGIN) else {
-                break;
-            };
-            match theorem::stabilise(&frame.view(&self.models), self.spec, group) {
-                Ok((margin, better)) if margin.margin > 2.0 * thickness => {
-                    thickness = margin.margin;
-                    parts = frame.restore(better);
-                }
-                _ => break,
+        Ok(match stable(&self.models, self.spec, group)? {
+            (margin, Some(parts)) => {
+                Verdict::Stable(thickened(&self.models, self.spec, group, margin, parts).1)
             }
-        }
-        Ok(Verdict::Stable(parts))
+            (margin, None) => Verdict::Conflict(margin),
+        })
     }
 
     /// The least `g` of a group, and coordinates in which (T2) is at ease near it: each solution's
@@ -217,7 +239,7 @@ impl Road<'_> {
                 .collect(),
             modes: parts
                 .iter()
-                .map(|part| physical_gains(&part.gain, &self.units, spec.latency))
+                .map(|part| physical_gains(&part.gain, &self.units, spec))
                 .collect(),
             gamma,
             optimum,
@@ -263,13 +285,9 @@ impl Levels {
 }
 
 /// Splits `K~ = [K, K_u, G]` and undoes the scaling; exact, since the units are powers of two.
-fn physical_gains(gain: &DMatrix<f64>, units: &Units, latency: usize) -> ModeGains {
-    let (n, m, r) = (
-        units.states.len(),
-        units.inputs.len(),
-        units.integrators.len(),
-    );
-    let previous = latency * m;
+fn physical_gains(gain: &DMatrix<f64>, units: &Units, spec: &ControlSpec) -> ModeGains {
+    let (n, m) = (units.states.len(), units.inputs.len());
+    let previous = spec.latency * m;
     let inverse = |values: &[f64]| values.iter().map(|v| 1.0 / v).collect::<Vec<_>>();
     let outward = inverse(&units.inputs);
     let part = |first: usize, units: &[f64]| {
@@ -279,6 +297,6 @@ fn physical_gains(gain: &DMatrix<f64>, units: &Units, latency: usize) -> ModeGai
     ModeGains {
         state_feedback: part(0, &units.states),
         previous_input: part(n, &units.inputs[..previous]),
-        integral: part(n + previous, &units.integrators[..r]),
+        integral: part(n + previous, &units.integral_part(spec)),
     }
 }

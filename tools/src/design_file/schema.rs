@@ -6,6 +6,7 @@
 
 use super::signal::{Event, Signal};
 use super::values::{NameOrList, NumberOrList};
+use ftc::plant::rectifier::Rectifier;
 use serde::Deserialize;
 
 /// A whole design file.
@@ -16,9 +17,11 @@ pub struct DesignFile {
     pub name: String,
     /// `Te` in seconds.
     pub sample_time: f64,
-    /// The modes of the plant, `[[mode]]`.
-    #[serde(rename = "mode")]
+    /// The modes of the plant, `[[mode]]`; none where the plant has a model with a name.
+    #[serde(rename = "mode", default)]
     pub modes: Vec<Mode>,
+    /// A nonlinear plant with a name, in place of the modes.
+    pub plant: Option<PlantModel>,
     /// What the signals are called and measured in.
     #[serde(default)]
     pub signals: Signals,
@@ -39,6 +42,14 @@ pub struct DesignFile {
     /// The experiment.
     #[serde(default)]
     pub scenario: Scenario,
+}
+
+/// `[plant]`: what is simulated, and linearised for the design.
+#[derive(Clone, Debug, Deserialize)]
+#[serde(tag = "model", rename_all = "kebab-case")]
+pub enum PlantModel {
+    /// The averaged three-phase rectifier; one mode per load.
+    Rectifier(Rectifier),
 }
 
 /// One `[[mode]]`; matrices are lists of rows.
