@@ -39,8 +39,11 @@ pub fn request(file: &DesignFile, folder: &Path) -> Result<Request, String> {
     let dims = Dimensions::check(&plant)?;
     bearable(&plant, dims)?;
     let signals = signals(&file.signals, &plant, dims)?;
-    let control = control(&file.controller, &signals, dims)?;
     let disturbance = disturbance(file, dims)?;
+    let control = ControlSpec {
+        resonators: resonators(file, disturbance.as_ref())?,
+        ..control(&file.controller, &signals, dims)?
+    };
     let observer = observer(&file.observer, &control)?;
     let estimator = estimator(&file.estimator, disturbance, dims)?;
     let scenario = Play {
@@ -75,18 +78,11 @@ fn at<T>(key: &str, result: Result<T, String>) -> Result<T, String> {
 fn refuse_unbuilt(file: &DesignFile) -> Result<(), String> {
     let estimator = &file.estimator;
     let database = estimator.database.as_deref().unwrap_or(defaults::DATABASE);
-    let refusals = [
-        (
-            file.controller.internal_model == Some(true),
-            "controller.internal_model = true",
-            "leave the key out",
-        ),
-        (
-            database.to_lowercase().ends_with(".csv"),
-            "estimator.database from a CSV file",
-            "use \"commission\" or \"model\"",
-        ),
-    ];
+    let refusals = [(
+        database.to_lowercase().ends_with(".csv"),
+        "estimator.database from a CSV file",
+        "use \"commission\" or \"model\"",
+    )];
     match refusals.iter().find(|(asked, ..)| *asked) {
         Some((_, what, instead)) => Err(format!("{what} is not built yet: {instead}")),
         None => Ok(()),
@@ -325,10 +321,27 @@ fn control(
         lyapunov: lyapunov(given.lyapunov.unwrap_or(defaults::LYAPUNOV)),
         decay,
         objective: Objective::Attenuation,
+        resonators: Vec::new(),
         output_weight,
         integral_weight,
         input_weight,
     })
+}
+
+/// The angles of the internal model's resonators; none where no internal model is wanted.
+fn resonators(
+    file: &DesignFile,
+    disturbance: Option<&KnownDisturbance>,
+) -> Result<Vec<f64>, String> {
+    let wanted = file.controller.internal_model;
+    match (wanted.unwrap_or(defaults::INTERNAL_MODEL), disturbance) {
+        (false, _) => Ok(Vec::new()),
+        (true, Some(known)) => Ok(known.angles(file.sample_time)),
+        (true, None) => Err(
+            "controller.internal_model = true needs to know the disturbance: give [disturbance] with its period"
+                .into(),
+        ),
+    }
 }
 
 fn lyapunov(kind: LyapunovKind) -> Lyapunov {
