@@ -9,6 +9,7 @@
 //! examples ── reproduce ──> a page, JSON and CSV per experiment of the paper
 //! ```
 
+mod archive;
 mod as_printed;
 mod assemble;
 mod baselines;
@@ -22,6 +23,7 @@ mod progress;
 mod report;
 mod reproduce;
 mod simulate;
+mod ssp;
 mod summary;
 mod verify;
 
@@ -99,6 +101,9 @@ enum Command {
         /// Directory to write to; made if it does not exist.
         #[arg(long, value_name = "DIR")]
         out: PathBuf,
+        /// Also write NAME.ssp: both FMUs and their connections in one file (SSP 1.0).
+        #[arg(long)]
+        ssp: bool,
     },
     /// Run the design's scenario without any FMU: trajectories.csv, metrics.json, report.html and figures.
     ///
@@ -172,10 +177,10 @@ fn run(arguments: &Arguments) -> Result<String, Failure> {
             (Err(failure), true) => Err(failure.explained_in_json()),
         },
         Command::Verify { fmu, json } => verify::run(fmu, *json),
-        Command::Export { design, out } => {
+        Command::Export { design, out, ssp } => {
             let staging = output::Staging::new(out).map_err(Failure::Input)?;
             let design = solve(design, &progress)?;
-            export::write(&design, staging).map_err(Failure::Input)
+            export::write(&design, staging, *ssp).map_err(Failure::Input)
         }
         Command::Simulate {
             design,

@@ -586,10 +586,21 @@ fn controller_and_observer() {
             &["controller.input_weight has 1 entries"],
         ),
         (
-            "internal model",
-            "latency = 0",
-            "internal_model = true",
-            &["controller.internal_model", "not built yet"],
+            "internal model of an unknown disturbance",
+            "[disturbance]\nperiod = 314.0\nharmonics = 1\n\n[controller]\n",
+            "[controller]\ninternal_model = true\n",
+            &["controller.internal_model", "[disturbance]"],
+        ),
+        (
+            "internal model of a disturbance that hardly moves",
+            "period = 314.0\nharmonics = 1\n\n[controller]\n",
+            "period = 31400.0\nharmonics = 1\n\n[controller]\ninternal_model = true\n",
+            &[
+                "harmonic 1",
+                "31400",
+                "sample_time",
+                "internal_model = false",
+            ],
         ),
         (
             "observer decay above 1",
