@@ -79,6 +79,7 @@ fn design(channel: Channel, control: ControlSpec) -> Design {
             disturbance: Some(disturbance(1)),
         },
         compensation: Compensation::VirtualSensor,
+        truth: ftc::simulate::Truth::AsDesigned,
         scenario: scenario(reference("sine"), 0.0, 1),
         control,
     })

@@ -73,6 +73,7 @@ fn design(model: &SwitchedPlant, truth: &SwitchedPlant, noise: f64) -> Design {
             states: signals("x"),
         },
         plant: model.clone(),
+        truth: ftc::simulate::Truth::AsDesigned,
         control,
         bumpless: false,
         observer,

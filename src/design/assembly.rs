@@ -21,8 +21,10 @@ pub struct Request {
     pub name: String,
     /// What the signals are called and measured in.
     pub signals: Signals,
-    /// The plant.
+    /// The plant as it is designed for.
     pub plant: SwitchedPlant,
+    /// What the simulated plant really is.
+    pub truth: Truth,
     /// The state feedback that is asked for.
     pub control: ControlSpec,
     /// Whether a mode switch leaves the command where it was.
@@ -167,7 +169,7 @@ pub fn assemble(request: Request) -> Result<Design, DesignError> {
             compensation: request.compensation,
             input_limits,
         },
-        truth: Truth::AsDesigned,
+        truth: request.truth,
         scenario: request.scenario,
         synthesis: Some(synthesis),
     })

@@ -46,7 +46,8 @@ pub fn merit(signal: &[f64], reference: &[f64]) -> Merit {
     }
 }
 
-fn variance(values: &[f64]) -> f64 {
+/// Mean square deviation from the mean; zero where there are no values.
+pub fn variance(values: &[f64]) -> f64 {
     let count = values.len().max(1) as f64;
     let mean = values.iter().sum::<f64>() / count;
     values.iter().map(|v| (v - mean) * (v - mean)).sum::<f64>() / count

@@ -5,17 +5,19 @@
 use crate::design_file::check;
 use crate::design_file::defaults;
 use crate::design_file::schema::{
-    self, CompensationMethod, DesignFile, EstimatorMethod, LyapunovKind, ObserverKind, SignalInfo,
+    self, CompensationMethod, DesignFile, EstimatorMethod, LyapunovKind, ObjectiveKind,
+    ObserverKind, PlantModel, SignalInfo,
 };
 use crate::design_file::signal::Signal as SignalOverTime;
-use crate::design_file::values::NumberOrList;
+use crate::design_file::values::{NameOrList, NumberOrList};
+use crate::healthy_log::Logs;
 use ftc::control::parameters;
 use ftc::design::assembly::{DatabaseSource, EstimatorSpec, KnownDisturbance, Request, Threshold};
 use ftc::design::{ControlSpec, Lyapunov, Objective, ObserverSpec, Signal, Signals};
 use ftc::plant::{Dimensions, Mode, OperatingPoint, SwitchedPlant};
 use ftc::rows;
-use ftc::simulate::Scenario;
 use ftc::simulate::scenario::{ModeInterval, Waveform};
+use ftc::simulate::{Scenario, Truth};
 use nalgebra::DMatrix;
 use std::path::Path;
 
@@ -34,7 +36,6 @@ const MOST_HARMONICS: usize = 50;
 /// One sentence that names the key and what to do.
 pub fn request(file: &DesignFile, folder: &Path) -> Result<Request, String> {
     at("name", check::identifier(&file.name))?;
-    refuse_unbuilt(file)?;
     let plant = plant(file)?;
     let dims = Dimensions::check(&plant)?;
     bearable(&plant, dims)?;
@@ -45,7 +46,12 @@ pub fn request(file: &DesignFile, folder: &Path) -> Result<Request, String> {
         ..control(&file.controller, &signals, dims)?
     };
     let observer = observer(&file.observer, &control)?;
-    let estimator = estimator(&file.estimator, disturbance, dims)?;
+    let logs = Logs {
+        plant: &plant,
+        signals: &signals,
+        folder,
+    };
+    let estimator = estimator(&file.estimator, disturbance, dims, &logs)?;
     let scenario = Play {
         scenario: &file.scenario,
         known: estimator.disturbance.as_ref(),
@@ -60,6 +66,7 @@ pub fn request(file: &DesignFile, folder: &Path) -> Result<Request, String> {
         name: file.name.clone(),
         signals,
         plant,
+        truth: truth(file),
         control,
         bumpless: file.controller.bumpless.unwrap_or(defaults::BUMPLESS),
         observer,
@@ -74,23 +81,58 @@ fn at<T>(key: &str, result: Result<T, String>) -> Result<T, String> {
     result.map_err(|what| format!("{key} {what}"))
 }
 
-/// Says no to what the design file's contract knows and this release does not do.
-fn refuse_unbuilt(file: &DesignFile) -> Result<(), String> {
-    let estimator = &file.estimator;
-    let database = estimator.database.as_deref().unwrap_or(defaults::DATABASE);
-    let refusals = [(
-        database.to_lowercase().ends_with(".csv"),
-        "estimator.database from a CSV file",
-        "use \"commission\" or \"model\"",
-    )];
-    match refusals.iter().find(|(asked, ..)| *asked) {
-        Some((_, what, instead)) => Err(format!("{what} is not built yet: {instead}")),
-        None => Ok(()),
+/// What is simulated: the modes themselves, or the named model they are linearised from.
+fn truth(file: &DesignFile) -> Truth {
+    match &file.plant {
+        None => Truth::AsDesigned,
+        Some(PlantModel::Rectifier(rectifier)) => Truth::Rectifier(rectifier.clone()),
     }
+}
+
+/// The modes of a named model: its linearisations.
+fn linearised(model: &PlantModel, sample_time: f64) -> Result<SwitchedPlant, String> {
+    let PlantModel::Rectifier(rectifier) = model;
+    let values = [
+        ("inductance", rectifier.inductance),
+        ("resistance", rectifier.resistance),
+        ("capacitance", rectifier.capacitance),
+        ("phase_voltage", rectifier.phase_voltage),
+        ("current_loop", rectifier.current_loop),
+        ("dc_voltage", rectifier.dc_voltage),
+    ];
+    for (key, value) in values {
+        at(&format!("plant.{key}"), check::positive(value))?;
+    }
+    at(
+        "plant.loads",
+        check::each(&rectifier.loads, check::positive),
+    )?;
+    if rectifier.loads.is_empty() || rectifier.loads.len() > LARGEST_SIZE {
+        return Err(format!(
+            "plant.loads has {} entries: give 1 to {LARGEST_SIZE}, one per mode",
+            rectifier.loads.len()
+        ));
+    }
+    at("plant:", rectifier.linearise(sample_time))
 }
 
 fn plant(file: &DesignFile) -> Result<SwitchedPlant, String> {
     at("sample_time", check::positive(file.sample_time))?;
+    match (&file.plant, file.modes.is_empty()) {
+        (Some(model), true) => return linearised(model, file.sample_time),
+        (Some(_), false) => {
+            return Err(
+                "[plant] and [[mode]] exclude each other: a named model brings its own modes"
+                    .into(),
+            );
+        }
+        (None, true) => {
+            return Err(
+                "mode is missing: add at least one [[mode]], or a [plant] with a model".into(),
+            );
+        }
+        (None, false) => {}
+    }
     if file.modes.len() > LARGEST_SIZE {
         return Err(format!(
             "mode: there are {} modes: give at most {LARGEST_SIZE}",
@@ -320,7 +362,10 @@ fn control(
         latency,
         lyapunov: lyapunov(given.lyapunov.unwrap_or(defaults::LYAPUNOV)),
         decay,
-        objective: Objective::Attenuation,
+        objective: match given.objective.unwrap_or(defaults::OBJECTIVE) {
+            ObjectiveKind::Attenuation => Objective::Attenuation,
+            ObjectiveKind::Decay => Objective::Decay,
+        },
         resonators: Vec::new(),
         output_weight,
         integral_weight,
@@ -456,6 +501,7 @@ fn estimator(
     given: &schema::Estimator,
     disturbance: Option<KnownDisturbance>,
     dims: Dimensions,
+    logs: &Logs,
 ) -> Result<EstimatorSpec, String> {
     let method = match given.method.unwrap_or(defaults::ESTIMATOR) {
         EstimatorMethod::Reference => parameters::EstimatorMethod::Reference,
@@ -479,7 +525,7 @@ fn estimator(
     Ok(EstimatorSpec {
         method,
         response_length,
-        database: database(given)?,
+        database: database(given, logs)?,
         threshold: threshold(given, dims)?,
         debounce,
         adapt: given.adapt.unwrap_or(defaults::ADAPT),
@@ -487,16 +533,38 @@ fn estimator(
     })
 }
 
-fn database(given: &schema::Estimator) -> Result<DatabaseSource, String> {
-    match given.database.as_deref().unwrap_or(defaults::DATABASE) {
-        "commission" => Ok(DatabaseSource::Commission),
-        "model" => Ok(DatabaseSource::Model),
-        other => Err(format!(
-            "estimator.database = \"{}\" is not a known value: {}",
-            crate::design_file::sentence::shorten(other),
-            crate::design_file::suggest::nearest(other, &["commission", "model"])
-        )),
+fn database(given: &schema::Estimator, logs: &Logs) -> Result<DatabaseSource, String> {
+    let is_log = |name: &str| name.to_lowercase().ends_with(".csv");
+    let files = match &given.database {
+        None => return Ok(defaults::DATABASE),
+        Some(NameOrList::Name(name)) if name == "commission" => {
+            return Ok(DatabaseSource::Commission);
+        }
+        Some(NameOrList::Name(name)) if name == "model" => return Ok(DatabaseSource::Model),
+        Some(NameOrList::Name(name)) if !is_log(name) => {
+            return Err(format!(
+                "estimator.database = \"{}\" is not a known value and no CSV file: {}",
+                crate::design_file::sentence::shorten(name),
+                crate::design_file::suggest::nearest(name, &["commission", "model"])
+            ));
+        }
+        Some(files) => files,
+    };
+    if let NameOrList::List(names) = files
+        && let Some(name) = names.iter().find(|name| !is_log(name))
+    {
+        return Err(format!(
+            "estimator.database lists \"{}\": list CSV files only, one per mode",
+            crate::design_file::sentence::shorten(name)
+        ));
     }
+    if !matches!(given.method, None | Some(EstimatorMethod::Reference)) {
+        return Err(
+            "estimator.database names a log, which only method = \"reference\" uses: change one of them"
+                .into(),
+        );
+    }
+    at("estimator.database", logs.read(files)).map(DatabaseSource::Recorded)
 }
 
 fn threshold(given: &schema::Estimator, dims: Dimensions) -> Result<Threshold, String> {

@@ -1,17 +1,17 @@
 //! `export`: zips prebuilt generic binaries with the design as their resource. Nothing is compiled.
 
+use crate::archive::{self, Contents};
+use crate::certificate::{self, Certificate};
 use crate::output::Staging;
+use crate::ssp::{self, Component, System};
 use crate::summary;
 use ftc::design::Design;
 use model_description::xml::{self, Document};
 use model_description::{CONTROLLER, Interface, PLANT, VariableTable};
-use std::collections::BTreeMap;
 use std::fmt::Write as _;
 use std::fs;
-use std::io::{Cursor, Write};
-use std::path::Path;
-use zip::write::SimpleFileOptions;
-use zip::{CompressionMethod, DateTime, ZipWriter};
+use std::path::{Path, PathBuf};
+use std::time::SystemTime;
 
 /// One of the two FMUs.
 struct Kind {
@@ -73,48 +73,129 @@ const HOST: &str = if cfg!(target_os = "windows") {
 
 const LICENSES: &str = include_str!("../assets/licenses.txt");
 
-/// The contents of an FMU by path, in the order they are written.
-type Contents = BTreeMap<String, Vec<u8>>;
+/// What every FMU shows in a browser of models.
+const ICON: &[u8] = include_bytes!("../assets/model.png");
 
-/// Writes both FMUs; refuses a design whose certificate does not check.
+/// What an export needs of the design and of the machine.
+struct Exporter<'a> {
+    design: &'a Design,
+    /// The design as the binaries read it.
+    resource: Vec<u8>,
+    /// The proof, as `verify` reads it.
+    certificate: Vec<u8>,
+    interface: Interface,
+    binaries: Vec<Binaries>,
+}
+
+/// Writes both FMUs, and with `ssp` the package that holds them connected; refuses a design whose
+/// certificate does not check. Returns what there is to say.
 ///
 /// # Errors
 /// One sentence: no certificate, no binaries, or the output directory.
-pub fn write(design: &Design, staging: Staging) -> Result<String, String> {
+pub fn write(design: &Design, staging: Staging, ssp: bool) -> Result<String, String> {
     prove(design)?;
-    let folder = std::env::current_exe()
-        .ok()
-        .and_then(|program| program.parent().map(Path::to_path_buf))
-        .ok_or("cannot find the directory of this program: start it by its full path")?;
     let resource = serde_json::to_vec(design).map_err(|error| error.to_string())?;
-    let interface = Interface::from(design);
-    let mut packed = Vec::new();
+    let exporter = Exporter {
+        design,
+        certificate: serde_json::to_vec_pretty(&Certificate::of(design, &resource))
+            .map_err(|error| error.to_string())?,
+        resource,
+        interface: Interface::from(design),
+        binaries: Binaries::find()?,
+    };
+    let mut fmus = Contents::new();
     for kind in &KINDS {
-        let identifier = format!("{}_{}", design.name, kind.suffix);
-        let binaries = binaries(kind, &identifier, &folder)?;
-        packed = binaries.keys().cloned().collect();
-        let mut contents = binaries;
-        contents.insert(
-            "modelDescription.xml".into(),
-            describe(design, kind, &identifier, &interface, &resource)?.into_bytes(),
-        );
-        contents.insert("resources/design.json".into(), resource.clone());
-        contents.insert(
-            "documentation/index.html".into(),
-            documentation(design, kind).into_bytes(),
-        );
-        contents.insert("documentation/licenses/license.txt".into(), LICENSES.into());
-        let bytes = zip(&contents).map_err(|error| format!("cannot zip {identifier}: {error}"))?;
-        staging.add(&format!("{identifier}.fmu"), &bytes)?;
+        fmus.insert(exporter.file(kind), exporter.fmu(kind)?);
     }
-    let paths = staging.commit()?;
+    for (name, bytes) in &fmus {
+        staging.add(name, bytes)?;
+    }
+    if ssp {
+        let name = format!("{}.ssp", design.name);
+        staging.add(&name, &exporter.package(&name, &fmus)?)?;
+    }
     let mut text = String::new();
-    for path in paths {
+    for path in staging.commit()? {
         let _ = writeln!(text, "wrote {}", path.display());
     }
-    let platforms: Vec<&str> = packed.iter().filter_map(|p| p.split('/').nth(1)).collect();
-    let _ = writeln!(text, "platforms: {}", platforms.join(", "));
+    text.push_str(&platforms(&exporter.binaries));
     Ok(text)
+}
+
+impl Exporter<'_> {
+    fn identifier(&self, kind: &Kind) -> String {
+        format!("{}_{}", self.design.name, kind.suffix)
+    }
+
+    fn file(&self, kind: &Kind) -> String {
+        format!("{}.fmu", self.identifier(kind))
+    }
+
+    fn fmu(&self, kind: &Kind) -> Result<Vec<u8>, String> {
+        let identifier = self.identifier(kind);
+        let mut contents = Contents::from([
+            (
+                "modelDescription.xml".into(),
+                self.describe(kind, &identifier)?.into_bytes(),
+            ),
+            ("model.png".into(), ICON.into()),
+            ("resources/design.json".into(), self.resource.clone()),
+            (certificate::PATH.into(), self.certificate.clone()),
+            (
+                "documentation/index.html".into(),
+                documentation(self.design, kind).into_bytes(),
+            ),
+            ("documentation/licenses/license.txt".into(), LICENSES.into()),
+        ]);
+        for binaries in self.binaries.iter().filter(|binaries| !binaries.outdated) {
+            let Platform { name, extension } = binaries.platform;
+            contents.insert(
+                format!("binaries/{name}/{identifier}.{extension}"),
+                binaries.read(kind)?,
+            );
+        }
+        archive::zip(&identifier, &contents)
+    }
+
+    fn describe(&self, kind: &Kind, identifier: &str) -> Result<String, String> {
+        xml::write(&Document {
+            model_name: identifier,
+            model_identifier: identifier,
+            description: kind.description,
+            guid: &model_description::guid(kind.binary, &self.resource),
+            version: env!("CARGO_PKG_VERSION"),
+            license: env!("CARGO_PKG_LICENSE"),
+            step_size: self.interface.sample_time,
+            stop_time: self.interface.stop_time,
+            directional_derivative: true,
+            table: &(kind.table)(&self.interface),
+        })
+        .map_err(|what| format!("{identifier}: {what}"))
+    }
+
+    /// The SSP package: the FMUs under `resources/` beside the description of how they connect.
+    fn package(&self, name: &str, fmus: &Contents) -> Result<Vec<u8>, String> {
+        let component = |kind: &'static Kind| Component {
+            name: kind.suffix,
+            source: format!("{}/{}", ssp::RESOURCES, self.file(kind)),
+            table: (kind.table)(&self.interface),
+        };
+        let system = System {
+            name: &self.design.name,
+            description: "Switched plant under sensor-fault-tolerant control",
+            stop_time: self.interface.stop_time,
+            step_size: self.interface.sample_time,
+            components: KINDS.iter().map(component).collect(),
+        };
+        let description =
+            ssp::describe(&system).map_err(|error| format!("cannot write {name}: {error}"))?;
+        let mut contents: Contents = fmus
+            .iter()
+            .map(|(file, bytes)| (format!("{}/{file}", ssp::RESOURCES), bytes.clone()))
+            .collect();
+        contents.insert(ssp::DESCRIPTION.into(), description);
+        archive::zip(name, &contents)
+    }
 }
 
 fn prove(design: &Design) -> Result<(), String> {
@@ -127,29 +208,100 @@ fn prove(design: &Design) -> Result<(), String> {
         .map_err(|error| format!("the certificate does not check ({error}): design it again"))
 }
 
-/// The binaries that are there, under their paths in the FMU.
-fn binaries(kind: &Kind, identifier: &str, folder: &Path) -> Result<Contents, String> {
-    let mut found = Contents::new();
-    for platform in &PLATFORMS {
-        let Platform { name, extension } = platform;
-        let prebuilt = folder.join(format!("fmu-binaries/{name}/{}.{extension}", kind.binary));
-        let host = folder.join(host_library(kind.binary));
-        let path = match (prebuilt.is_file(), *name == HOST && host.is_file()) {
-            (true, _) => prebuilt,
-            (false, true) => host,
-            (false, false) => continue,
-        };
-        let bytes = fs::read(&path)
-            .map_err(|error| format!("cannot read {} ({error}): build it again", path.display()))?;
-        found.insert(format!("binaries/{name}/{identifier}.{extension}"), bytes);
+/// The generic binaries of one platform.
+struct Binaries {
+    platform: &'static Platform,
+    /// Directory they are in.
+    folder: PathBuf,
+    /// Whether they are those that cargo left beside this program, for this machine.
+    native: bool,
+    /// Whether the sources were built again since, on this machine but not for that platform.
+    outdated: bool,
+}
+
+impl Binaries {
+    /// All that are built. For this machine's own platform the newest, else the portable ones.
+    fn find() -> Result<Vec<Self>, String> {
+        let beside = std::env::current_exe()
+            .ok()
+            .and_then(|program| program.parent().map(Path::to_path_buf))
+            .ok_or("cannot find the directory of this program: start it by its full path")?;
+        let found = Self::find_beside(&beside);
+        if found.iter().all(|binaries| binaries.outdated) {
+            return Err(format!(
+                "no FMU binary is built: {} is missing: run cargo build --release --workspace",
+                beside.join(host_library(CONTROLLER)).display()
+            ));
+        }
+        Ok(found)
     }
-    if found.is_empty() {
-        return Err(format!(
-            "no FMU binary is built: {} is missing: run cargo build --release --workspace",
-            folder.join(host_library(kind.binary)).display()
-        ));
+
+    fn find_beside(program: &Path) -> Vec<Self> {
+        let built_here = newest(program, host_library);
+        PLATFORMS
+            .iter()
+            .filter_map(|platform| {
+                let folder = program.join("fmu-binaries").join(platform.name);
+                let library = |binary: &str| format!("{binary}.{}", platform.extension);
+                let prebuilt = newest(&folder, library);
+                let current = prebuilt.is_some() && prebuilt >= built_here;
+                let native = !current && platform.name == HOST && built_here.is_some();
+                (native || prebuilt.is_some()).then(|| Self {
+                    platform,
+                    folder: if native { program.into() } else { folder },
+                    native,
+                    outdated: !native && !current,
+                })
+            })
+            .collect()
     }
-    Ok(found)
+
+    fn read(&self, kind: &Kind) -> Result<Vec<u8>, String> {
+        let path = self.folder.join(if self.native {
+            host_library(kind.binary)
+        } else {
+            format!("{}.{}", kind.binary, self.platform.extension)
+        });
+        fs::read(&path)
+            .map_err(|error| format!("cannot read {} ({error}): build it again", path.display()))
+    }
+}
+
+/// When the last of the two libraries was built; `None` unless both are there.
+fn newest(folder: &Path, library: impl Fn(&str) -> String) -> Option<SystemTime> {
+    let built = |binary: &str| fs::metadata(folder.join(library(binary)))?.modified();
+    let times = KINDS.iter().map(|kind| built(kind.binary));
+    times
+        .collect::<std::io::Result<Vec<_>>>()
+        .ok()?
+        .into_iter()
+        .max()
+}
+
+/// Says which platforms the FMUs run on, and what was left out.
+fn platforms(binaries: &[Binaries]) -> String {
+    let mut text = String::new();
+    let packed: Vec<String> = binaries
+        .iter()
+        .filter(|binaries| !binaries.outdated)
+        .map(
+            |Binaries {
+                 platform, native, ..
+             }| match native {
+                true => format!("{} (built for this machine)", platform.name),
+                false => platform.name.into(),
+            },
+        )
+        .collect();
+    let _ = writeln!(text, "platforms: {}", packed.join(", "));
+    for binaries in binaries.iter().filter(|binaries| binaries.outdated) {
+        let _ = writeln!(
+            text,
+            "left out {}: its binaries are older than this program's: run make fmu-all",
+            binaries.platform.name
+        );
+    }
+    text
 }
 
 /// What cargo calls the shared library on this platform.
@@ -159,49 +311,6 @@ fn host_library(binary: &str) -> String {
         std::env::consts::DLL_PREFIX,
         std::env::consts::DLL_SUFFIX
     )
-}
-
-fn describe(
-    design: &Design,
-    kind: &Kind,
-    identifier: &str,
-    interface: &Interface,
-    resource: &[u8],
-) -> Result<String, String> {
-    let table = (kind.table)(interface);
-    xml::write(&Document {
-        model_name: identifier,
-        model_identifier: identifier,
-        description: kind.description,
-        guid: &model_description::guid(kind.binary, resource),
-        version: env!("CARGO_PKG_VERSION"),
-        license: env!("CARGO_PKG_LICENSE"),
-        step_size: design.controller.plant.sample_time,
-        stop_time: interface.stop_time,
-        directional_derivative: true,
-        table: &table,
-    })
-    .map_err(|what| format!("{identifier}: {what}"))
-}
-
-/// Deflated, sorted, with one time stamp: the same contents give the same bytes.
-fn zip(contents: &Contents) -> zip::result::ZipResult<Vec<u8>> {
-    let mut archive = ZipWriter::new(Cursor::new(Vec::new()));
-    let options = SimpleFileOptions::default()
-        .compression_method(CompressionMethod::Deflated)
-        .compression_level(Some(6))
-        .last_modified_time(DateTime::default())
-        .unix_permissions(0o644);
-    for (path, bytes) in contents {
-        let mode = if path.starts_with("binaries/") {
-            0o755
-        } else {
-            0o644
-        };
-        archive.start_file(path.as_str(), options.unix_permissions(mode))?;
-        archive.write_all(bytes)?;
-    }
-    Ok(archive.finish()?.into_inner())
 }
 
 /// A page with the design report.

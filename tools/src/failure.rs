@@ -22,6 +22,15 @@ pub enum Failure {
         /// What to print to standard output beside the error.
         output: Option<String>,
     },
+    /// What was looked at does not hold what it promises.
+    Refused {
+        /// The file looked at.
+        file: String,
+        /// Why not; one sentence.
+        what: String,
+        /// What to print to standard output beside the error.
+        output: Option<String>,
+    },
 }
 
 impl Failure {
@@ -50,7 +59,7 @@ impl Failure {
                 asked,
                 error,
             },
-            input => input,
+            other => other,
         }
     }
 
@@ -58,7 +67,7 @@ impl Failure {
     pub fn output(&self) -> Option<&str> {
         match self {
             Self::Input(_) => None,
-            Self::NoDesign { output, .. } => output.as_deref(),
+            Self::NoDesign { output, .. } | Self::Refused { output, .. } => output.as_deref(),
         }
     }
 
@@ -66,7 +75,7 @@ impl Failure {
     pub fn exit_code(&self) -> ExitCode {
         match self {
             Self::Input(_) => ExitCode::from(2),
-            Self::NoDesign { .. } => ExitCode::from(1),
+            Self::NoDesign { .. } | Self::Refused { .. } => ExitCode::from(1),
         }
     }
 }
@@ -76,6 +85,7 @@ impl fmt::Display for Failure {
         match self {
             Self::Input(what) => f.write_str(what),
             Self::NoDesign { file, error, .. } => write!(f, "{file}: {error}"),
+            Self::Refused { file, what, .. } => write!(f, "{file}: {what}"),
         }
     }
 }

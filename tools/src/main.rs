@@ -4,22 +4,35 @@
 //! DESIGN.toml ── design_file ──> assemble ──> ftc::design ──┬─> report   (design)
 //!                                                           ├─> export   (two FMUs)
 //!                                                           └─> simulate (trajectories, metrics)
+//!                                         FMU ──────────────────> verify (the proof, once more)
+//!
+//! examples ── reproduce ──> a page, JSON and CSV per experiment of the paper
 //! ```
 
+mod archive;
+mod as_printed;
 mod assemble;
+mod baselines;
+mod certificate;
 mod design_file;
 mod export;
 mod failure;
+mod healthy_log;
 mod output;
 mod progress;
 mod report;
+mod reproduce;
 mod simulate;
+mod ssp;
 mod summary;
+mod verify;
 
 use clap::{Parser, Subcommand};
 use failure::Failure;
 use ftc::design::Design;
+use ftc::design::assembly::Request;
 use progress::Progress;
+use reproduce::Experiment;
 use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
@@ -41,8 +54,9 @@ struct Arguments {
 const EXIT_CODES: &str = "\
 Exit codes:
   0  done
-  1  there is no such controller: the design is infeasible or could not be certified
-  2  the command line, the design file or the output directory is at fault; nothing was written";
+  1  there is no such controller: the design is infeasible or could not be certified;
+     of verify: the FMU does not hold what it promises
+  2  the command line, a file or the output directory is at fault; nothing was written";
 
 #[derive(Subcommand)]
 enum Command {
@@ -58,6 +72,23 @@ enum Command {
         /// Print one JSON object instead, also when there is no such controller.
         #[arg(long)]
         json: bool,
+        /// Put the paper's Theorems 1 and 2 exactly as printed to the margin problem instead:
+        /// their best margins, and why they have no strictly feasible point.
+        #[arg(long)]
+        as_printed: bool,
+    },
+    /// Prove again, from the numbers in an FMU alone, what it promises. Nothing is solved.
+    ///
+    /// Checks that description, design and certificate belong together and that the gains which
+    /// run are those that were proved, then proves every inequality with rounding accounted for:
+    /// stability under arbitrary switching or beyond a dwell time, decay, and gamma per mode.
+    #[command(after_help = EXIT_CODES)]
+    Verify {
+        /// FMU that ftc-fmu export wrote.
+        fmu: PathBuf,
+        /// Print one JSON object instead, also when the proof fails.
+        #[arg(long)]
+        json: bool,
     },
     /// Write NAME_controller.fmu and NAME_plant.fmu (FMI 2.0, co-simulation).
     ///
@@ -70,6 +101,9 @@ enum Command {
         /// Directory to write to; made if it does not exist.
         #[arg(long, value_name = "DIR")]
         out: PathBuf,
+        /// Also write NAME.ssp: both FMUs and their connections in one file (SSP 1.0).
+        #[arg(long)]
+        ssp: bool,
     },
     /// Run the design's scenario without any FMU: trajectories.csv, metrics.json, report.html and figures.
     ///
@@ -80,6 +114,24 @@ enum Command {
     Simulate {
         /// Design file (TOML).
         design: PathBuf,
+        /// Directory to write to; made if it does not exist.
+        #[arg(long, value_name = "DIR")]
+        out: PathBuf,
+        /// Run two more: the paper's additive fault-tolerant control with gains that only decay
+        /// (additive) and model predictive control without fault estimation (mpc); and give the
+        /// bound that no causal controller beats (deadbeat_bound).
+        #[arg(long)]
+        baselines: bool,
+    },
+    /// Run the paper's experiments and write one page each, with the same numbers as JSON and CSV.
+    ///
+    /// paper: its example in every variant, what it says beside what is found, and its figures.
+    /// converter: the AC/DC converter under every kind of sensor fault, against model predictive
+    /// control.
+    #[command(after_help = EXIT_CODES)]
+    Reproduce {
+        /// Which experiment.
+        experiment: Experiment,
         /// Directory to write to; made if it does not exist.
         #[arg(long, value_name = "DIR")]
         out: PathBuf,
@@ -111,33 +163,56 @@ fn run(arguments: &Arguments) -> Result<String, Failure> {
     match &arguments.command {
         Command::Design {
             design,
-            json: false,
-        } => Ok(summary::text(&solve(design, &progress)?)),
-        Command::Design { design, json: true } => match solve(design, &progress) {
-            Ok(design) => Ok(summary::json(&design)),
-            Err(failure) => Err(failure.explained_in_json()),
+            json,
+            as_printed: true,
+        } => {
+            let request = read(design, &progress)?;
+            progress.tell("looking for a margin");
+            as_printed::report(design, request, *json)
+        }
+        Command::Design { design, json, .. } => match (solve(design, &progress), json) {
+            (Ok(design), false) => Ok(summary::text(&design)),
+            (Ok(design), true) => Ok(summary::json(&design)),
+            (Err(failure), false) => Err(failure),
+            (Err(failure), true) => Err(failure.explained_in_json()),
         },
-        Command::Export { design, out } => {
+        Command::Verify { fmu, json } => verify::run(fmu, *json),
+        Command::Export { design, out, ssp } => {
             let staging = output::Staging::new(out).map_err(Failure::Input)?;
             let design = solve(design, &progress)?;
-            export::write(&design, staging).map_err(Failure::Input)
+            export::write(&design, staging, *ssp).map_err(Failure::Input)
         }
-        Command::Simulate { design, out } => {
+        Command::Simulate {
+            design,
+            out,
+            baselines,
+        } => {
             let staging = output::Staging::new(out).map_err(Failure::Input)?;
             let design = solve(design, &progress)?;
             progress.tell("simulating");
-            simulate::write(&design, staging).map_err(Failure::Input)
+            simulate::write(&design, *baselines, staging).map_err(Failure::Input)
+        }
+        Command::Reproduce { experiment, out } => {
+            let staging = output::Staging::new(out).map_err(Failure::Input)?;
+            reproduce::write(*experiment, &staging, &progress)
+                .and_then(|text| staging.commit().map(|_| text))
+                .map_err(Failure::Input)
         }
     }
 }
 
-/// Reads a design file and makes the design.
-fn solve(path: &Path, progress: &Progress) -> Result<Design, Failure> {
+/// Reads a design file.
+fn read(path: &Path, progress: &Progress) -> Result<Request, Failure> {
     progress.tell("reading the design file");
     let file = design_file::read(path).map_err(Failure::Input)?;
     let folder = path.parent().unwrap_or(Path::new(""));
-    let request = assemble::request(&file, folder)
-        .map_err(|what| Failure::Input(format!("{}: {what}", path.display())))?;
+    assemble::request(&file, folder)
+        .map_err(|what| Failure::Input(format!("{}: {what}", path.display())))
+}
+
+/// Reads a design file and makes the design.
+fn solve(path: &Path, progress: &Progress) -> Result<Design, Failure> {
+    let request = read(path, progress)?;
     let asked = request.control.clone();
     progress.tell("solving for gains and certifying them");
     ftc::design::assembly::assemble(request).map_err(|error| Failure::new(path, asked, error))

@@ -1,5 +1,6 @@
 //! `simulate`: every variant of the loop natively, written down sample by sample.
 
+use crate::baselines;
 use crate::output::Staging;
 use crate::report;
 use ftc::control::Controller;
@@ -9,20 +10,29 @@ use ftc::simulate::{PlantSimulator, Trajectory, Variant, run};
 use serde_json::{Map, Value, json};
 use std::fmt::Write;
 
-/// Runs the scenario in every variant and writes `trajectories.csv` and `metrics.json`.
+/// Runs the scenario in every variant, and with every baseline if asked for, and writes
+/// `trajectories.csv`, `metrics.json` and the report.
 ///
 /// # Errors
-/// One sentence about the output directory.
-pub fn write(design: &Design, staging: Staging) -> Result<String, String> {
+/// One sentence about the output directory or a baseline.
+pub fn write(design: &Design, baselines: bool, staging: Staging) -> Result<String, String> {
     let report = staging.target("report.html");
-    let trajectories = trajectories(design);
+    let mut trajectories = trajectories(design);
+    let mut bound = None;
+    if baselines {
+        trajectories.extend(baselines::trajectories(design, &plant(design))?);
+        bound = Some(baselines::bound(design, &trajectories[0]));
+    }
     let csv = table(design, &trajectories).map_err(|error| error.to_string())?;
     staging.add("trajectories.csv", &csv)?;
-    staging.add("metrics.json", metrics(design, &trajectories).as_bytes())?;
+    staging.add(
+        "metrics.json",
+        metrics(design, &trajectories, bound.as_deref()).as_bytes(),
+    )?;
     report::write(design, &trajectories, &staging.folder().join("report.html"))
         .map_err(|error| format!("{error:#}"))?;
     staging.commit()?;
-    let mut text = summary(design, &trajectories);
+    let mut text = summary(design, &trajectories, bound.as_deref());
     let _ = writeln!(
         text,
         "wrote {}, trajectories.csv, metrics.json and the figures",
@@ -31,13 +41,17 @@ pub fn write(design: &Design, staging: Staging) -> Result<String, String> {
     Ok(text)
 }
 
-/// Every variant of the design's scenario.
-pub fn trajectories(design: &Design) -> Vec<Trajectory> {
-    let plant = PlantSimulator::with_truth(
+fn plant(design: &Design) -> PlantSimulator {
+    PlantSimulator::with_truth(
         design.controller.plant.clone(),
         design.truth.clone(),
         design.scenario.clone(),
-    );
+    )
+}
+
+/// Every variant of the design's scenario.
+pub fn trajectories(design: &Design) -> Vec<Trajectory> {
+    let plant = plant(design);
     let controller = Controller::new(design.controller.clone());
     Variant::ALL
         .iter()
@@ -126,8 +140,9 @@ fn number(value: f64) -> String {
     format!("{value:?}")
 }
 
-/// Per variant `mse` and `vaf`, each measured and true, one number per tracked output.
-fn metrics(design: &Design, trajectories: &[Trajectory]) -> String {
+/// Per variant `mse` and `vaf`, each measured and true, one number per tracked output; of the
+/// deadbeat bound the true `mse` alone.
+fn metrics(design: &Design, trajectories: &[Trajectory], bound: Option<&[f64]>) -> String {
     let tracked = &design.controller.feedback.tracked;
     let of = |trajectory: &Trajectory| {
         let merits = trajectory.merits(tracked);
@@ -138,12 +153,18 @@ fn metrics(design: &Design, trajectories: &[Trajectory]) -> String {
         });
         (trajectory.variant.key().to_string(), value)
     };
-    let variants: Map<String, Value> = trajectories.iter().map(of).collect();
+    let mut variants: Map<String, Value> = trajectories.iter().map(of).collect();
+    if let Some(mse) = bound {
+        variants.insert(BOUND.into(), json!({ "mse": { "true": mse } }));
+    }
     format!("{:#}\n", Value::Object(variants))
 }
 
+/// Name of the deadbeat bound in files.
+const BOUND: &str = "deadbeat_bound";
+
 /// The same as a small table for a person.
-fn summary(design: &Design, trajectories: &[Trajectory]) -> String {
+fn summary(design: &Design, trajectories: &[Trajectory], bound: Option<&[f64]>) -> String {
     let mut text = format!(
         "{}: {} samples of {} s\n\n{:<16}{:<12}{:>14}{:>14}{:>12}{:>12}\n",
         design.name,
@@ -170,6 +191,10 @@ fn summary(design: &Design, trajectories: &[Trajectory]) -> String {
                 merits.truth.vaf,
             );
         }
+    }
+    for (mse, &output) in bound.unwrap_or_default().iter().zip(tracked) {
+        let name = &design.signals.outputs[output].name;
+        let _ = writeln!(text, "{BOUND:<16}{name:<12}{:>14}{mse:>14.5e}", "");
     }
     text.push('\n');
     text

@@ -268,6 +268,7 @@ pub fn json_of_failure(asked: &ControlSpec, error: &DesignError) -> String {
     }))
 }
 
-fn pretty(value: &Value) -> String {
+/// JSON as this program prints it.
+pub fn pretty(value: &Value) -> String {
     format!("{value:#}\n")
 }

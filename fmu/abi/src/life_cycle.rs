@@ -27,6 +27,15 @@ pub enum State {
 }
 
 impl State {
+    /// Whether an instance can be saved in this state, and ever is in it.
+    pub fn is_savable(self) -> bool {
+        let reached = !matches!(
+            self,
+            Self::StepInProgress | Self::StepFailed | Self::StepCanceled
+        );
+        reached && Function::GetFMUstate.allowed().contain(self)
+    }
+
     /// What a person calls the state.
     pub fn name(self) -> &'static str {
         match self {

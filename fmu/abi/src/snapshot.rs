@@ -103,6 +103,7 @@ impl<T> Snapshot<T> {
             return Err(format!("the bytes belong to the FMU with guid {of}"));
         }
         let fits = snapshot.values.len() == slave.variables().len()
+            && snapshot.phase.is_savable()
             && snapshot.clock.is_sound(slave.sample_time())
             && (snapshot.clock.is_at_rest() || snapshot.phase == State::Error)
             && slave.fits(&snapshot.state);

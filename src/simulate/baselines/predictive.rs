@@ -10,16 +10,17 @@
 //! sum |S C (x_k - x_s)|^2 W_y^2 + |u_k - u_s|^2 W_u^2  +  (x_N - x_s)' P (x_N - x_s)
 //! ```
 //!
-//! subject to the input limits, where `(x_s, u_s)` is the steady state that puts `S (C x + d)` on
+//! subject to the input limits. Where no limit binds the optimum is a linear function of the state
+//! and needs no iteration; where one does, the quadratic programme is solved. Here `(x_s, u_s)` is the steady state that puts `S (C x + d)` on
 //! the reference, and `P` solves the Riccati equation.
 
 use crate::control::parameters::Limits;
-use crate::plant::SwitchedPlant;
+use crate::plant::{Mode, SwitchedPlant};
 use crate::simulate::closed_loop::{Regulator, Report};
 use crate::simulate::plant::PlantState;
 use clarabel::algebra::CscMatrix;
 use clarabel::solver::{DefaultSettings, DefaultSolver, IPSolver, SupportedConeT};
-use nalgebra::{DMatrix, DVector};
+use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 use std::ops::AddAssign;
 
 /// What the controller is asked for.
@@ -51,11 +52,16 @@ pub struct Predictive {
     command: Vec<f64>,
     silent: Vec<f64>,
     calm: Vec<bool>,
+    late: bool,
 }
 
 /// Everything of one mode that can be computed beforehand.
 struct Planner {
     solver: DefaultSolver<f64>,
+    /// Factor of the quadratic term.
+    hessian: Cholesky<f64, Dyn>,
+    /// Lowest and highest deviation from `u0` of each input (m).
+    room: Vec<(f64, f64)>,
     /// `q = from_state (x - x_s) + from_input u_s`.
     from_state: DMatrix<f64>,
     from_input: DMatrix<f64>,
@@ -91,7 +97,28 @@ impl Predictive {
             command: point.u.clone(),
             silent: vec![0.0; dims.outputs],
             calm: vec![false; dims.outputs],
+            late: false,
         })
+    }
+
+    /// The same controller for a loop in which a command acts one sample after it was computed: it
+    /// plans from the state that the command already under way leads to.
+    #[must_use]
+    pub fn one_sample_late(mut self) -> Self {
+        self.late = true;
+        self
+    }
+
+    /// The state from which a command computed now acts.
+    fn starting_point(&self, mode: &Mode) -> DVector<f64> {
+        match self.late {
+            false => self.estimate.clone(),
+            true => {
+                &mode.a * &self.estimate
+                    + &mode.b * DVector::from_column_slice(&self.command)
+                    + mode.state_offset()
+            }
+        }
     }
 
     /// Corrects state and output disturbance with the measurement; a lost sensor corrects nothing.
@@ -112,26 +139,18 @@ impl Predictive {
     fn plan(&mut self, seen: &PlantState) {
         let mode = &self.plant.modes[seen.mode];
         let point = &mode.operating_point;
+        let start = self.starting_point(mode);
         let planner = &mut self.modes[seen.mode];
         let wanted = DVector::from_fn(self.tracked.len(), |i, _| {
             seen.reference[i] - point.y[self.tracked[i]] - self.offset[self.tracked[i]]
         });
         let steady = &planner.target * wanted;
         let n = self.estimate.len();
-        let deviation = &self.estimate - DVector::from_column_slice(&point.x) - steady.rows(0, n);
+        let deviation = start - DVector::from_column_slice(&point.x) - steady.rows(0, n);
         let linear = &planner.from_state * deviation
             + &planner.from_input * steady.rows(n, self.command.len());
-        if planner
-            .solver
-            .update_q(&linear.as_slice().to_vec())
-            .is_err()
-        {
-            return;
-        }
-        planner.solver.solve();
-        let plan = &planner.solver.solution.x;
-        if plan.iter().all(|value| value.is_finite()) {
-            for ((command, step), u0) in self.command.iter_mut().zip(plan).zip(&point.u) {
+        if let Some(step) = planner.first_step(&linear) {
+            for ((command, step), u0) in self.command.iter_mut().zip(&step).zip(&point.u) {
                 *command = u0 + step;
             }
         }
@@ -166,6 +185,21 @@ impl Regulator for Predictive {
 }
 
 impl Planner {
+    /// The first inputs of the optimal plan as deviations from `u0` (m); none where the solver fails.
+    fn first_step(&mut self, linear: &DVector<f64>) -> Option<Vec<f64>> {
+        let m = self.room.len();
+        let free = -self.hessian.solve(linear);
+        let fits = |(step, room): (&f64, &(f64, f64))| (room.0..=room.1).contains(step);
+        if free.iter().zip(self.room.iter().cycle()).all(fits) {
+            return Some(free.rows(0, m).iter().copied().collect());
+        }
+        self.solver.update_q(&linear.as_slice().to_vec()).ok()?;
+        self.solver.solve();
+        let plan = &self.solver.solution.x;
+        let finite = plan.iter().all(|value| value.is_finite());
+        finite.then(|| plan.iter().take(m).copied().collect())
+    }
+
     fn new(plant: &SwitchedPlant, spec: &PredictiveSpec, index: usize) -> Result<Self, String> {
         let mode = &plant.modes[index];
         let (a, b) = (&mode.a, &mode.b);
@@ -219,12 +253,27 @@ impl Planner {
         let from_input = -(&hessian * &repeat);
         Ok(Self {
             solver: programme(&hessian, horizon, &mode.operating_point.u, &spec.limits)?,
+            room: room(&mode.operating_point.u, &spec.limits),
+            hessian: hessian
+                .cholesky()
+                .ok_or("the quadratic term is not positive definite")?,
             from_state: pull * free,
             from_input,
             target: steady_state(a, b, &select)?,
             kalman: kalman(plant, index, spec)?,
         })
     }
+}
+
+/// How far each input may go from `u0`, downwards and upwards.
+fn room(u0: &[f64], limits: &[Limits]) -> Vec<(f64, f64)> {
+    let of = |(limit, centre): (&Limits, &f64)| {
+        (
+            limit.min.map_or(f64::NEG_INFINITY, |min| min - centre),
+            limit.max.map_or(f64::INFINITY, |max| max - centre),
+        )
+    };
+    limits.iter().zip(u0).map(of).collect()
 }
 
 /// The quadratic programme with box constraints on every planned input.

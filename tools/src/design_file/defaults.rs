@@ -24,7 +24,10 @@
 //!
 //! The other defaults are the constants below.
 
-use super::schema::{CompensationMethod, EstimatorMethod, LyapunovKind, ObserverKind};
+use super::schema::{
+    CompensationMethod, EstimatorMethod, LyapunovKind, ObjectiveKind, ObserverKind,
+};
+use ftc::design::assembly::DatabaseSource;
 
 /// `disturbance.harmonics`
 pub const HARMONICS: usize = 1;
@@ -32,6 +35,8 @@ pub const HARMONICS: usize = 1;
 pub const LATENCY: usize = 0;
 /// `controller.lyapunov`
 pub const LYAPUNOV: LyapunovKind = LyapunovKind::Common;
+/// `controller.objective`
+pub const OBJECTIVE: ObjectiveKind = ObjectiveKind::Attenuation;
 /// `controller.decay`
 pub const DECAY: f64 = 0.95;
 /// `controller.output_weight`, per unit of the nominal value.
@@ -49,7 +54,7 @@ pub const OBSERVER: ObserverKind = ObserverKind::Auto;
 /// `estimator.method`
 pub const ESTIMATOR: EstimatorMethod = EstimatorMethod::Reference;
 /// `estimator.database`
-pub const DATABASE: &str = "commission";
+pub const DATABASE: DatabaseSource = DatabaseSource::Commission;
 /// `estimator.sigmas`
 pub const SIGMAS: f64 = 6.0;
 /// `estimator.debounce`

@@ -5,7 +5,8 @@
 //! [`super::defaults`]; what a value must satisfy, in [`super::check`].
 
 use super::signal::{Event, Signal};
-use super::values::NumberOrList;
+use super::values::{NameOrList, NumberOrList};
+use ftc::plant::rectifier::Rectifier;
 use serde::Deserialize;
 
 /// A whole design file.
@@ -16,9 +17,11 @@ pub struct DesignFile {
     pub name: String,
     /// `Te` in seconds.
     pub sample_time: f64,
-    /// The modes of the plant, `[[mode]]`.
-    #[serde(rename = "mode")]
+    /// The modes of the plant, `[[mode]]`; none where the plant has a model with a name.
+    #[serde(rename = "mode", default)]
     pub modes: Vec<Mode>,
+    /// A nonlinear plant with a name, in place of the modes.
+    pub plant: Option<PlantModel>,
     /// What the signals are called and measured in.
     #[serde(default)]
     pub signals: Signals,
@@ -39,6 +42,14 @@ pub struct DesignFile {
     /// The experiment.
     #[serde(default)]
     pub scenario: Scenario,
+}
+
+/// `[plant]`: what is simulated, and linearised for the design.
+#[derive(Clone, Debug, Deserialize)]
+#[serde(tag = "model", rename_all = "kebab-case")]
+pub enum PlantModel {
+    /// The averaged three-phase rectifier; one mode per load.
+    Rectifier(Rectifier),
 }
 
 /// One `[[mode]]`; matrices are lists of rows.
@@ -128,6 +139,8 @@ pub struct Controller {
     pub latency: Option<i64>,
     /// Which guarantee of stability under switching.
     pub lyapunov: Option<LyapunovKind>,
+    /// What the gains are chosen for.
+    pub objective: Option<ObjectiveKind>,
     /// Decay rate per sample.
     pub decay: Option<f64>,
     /// Weight of each tracked output (number or r).
@@ -152,6 +165,16 @@ pub enum LyapunovKind {
     Switched,
     /// One per mode, modes must last.
     Dwell,
+}
+
+/// Values of `controller.objective`.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum ObjectiveKind {
+    /// Least gain from the disturbance to the performance signal (T2).
+    Attenuation,
+    /// Stability with the decay rate only (T1).
+    Decay,
 }
 
 /// `[observer]`.
@@ -184,8 +207,8 @@ pub struct Estimator {
     pub method: Option<EstimatorMethod>,
     /// Past inputs the output remembers, in samples.
     pub response_length: Option<i64>,
-    /// `commission`, `model` or the name of a CSV file.
-    pub database: Option<String>,
+    /// `commission`, `model`, the name of a CSV file, or a list of one per mode.
+    pub database: Option<NameOrList>,
     /// Residual that flags a fault, per sensor (number or p).
     pub threshold: Option<NumberOrList>,
     /// The same in standard deviations of the healthy residual.

@@ -51,3 +51,35 @@ impl<'de> Deserialize<'de> for NumberOrList {
         deserializer.deserialize_any(Either)
     }
 }
+
+/// One name, or a list with one for each mode.
+#[derive(Clone, Debug, PartialEq)]
+pub enum NameOrList {
+    /// One for all.
+    Name(String),
+    /// One each.
+    List(Vec<String>),
+}
+
+impl<'de> Deserialize<'de> for NameOrList {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        struct Either;
+        impl<'de> Visitor<'de> for Either {
+            type Value = NameOrList;
+            fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+                f.write_str("a text or a list of texts")
+            }
+            fn visit_str<E: Error>(self, name: &str) -> Result<NameOrList, E> {
+                Ok(NameOrList::Name(name.to_string()))
+            }
+            fn visit_seq<A: SeqAccess<'de>>(self, mut list: A) -> Result<NameOrList, A::Error> {
+                let mut names = Vec::new();
+                while let Some(name) = list.next_element()? {
+                    names.push(name);
+                }
+                Ok(NameOrList::List(names))
+            }
+        }
+        deserializer.deserialize_any(Either)
+    }
+}

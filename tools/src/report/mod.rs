@@ -15,9 +15,9 @@ mod demo;
 pub mod figure;
 pub mod page;
 mod svg;
-mod text;
+pub mod text;
 
-pub use demo::write;
+pub use demo::{events, write};
 
 #[cfg(test)]
 mod tests;

@@ -48,7 +48,9 @@ pub fn aligned(value: f64, decimals: usize) -> String {
     if !value.is_finite() {
         return "–".into();
     }
-    format!("{value:.decimals$}").replace('-', "−")
+    let digits = format!("{value:.decimals$}");
+    let zero = !digits.contains(|c: char| ('1'..='9').contains(&c));
+    digits.replace('-', if zero { "" } else { "−" })
 }
 
 /// An exponent as superscript digits.
@@ -102,6 +104,12 @@ mod tests {
         ] {
             assert_eq!(number(value), wanted);
         }
+    }
+
+    #[test]
+    fn what_rounds_to_zero_has_no_sign() {
+        assert_eq!(aligned(-2e-15, 3), "0.000");
+        assert_eq!(aligned(-0.01, 2), "−0.01");
     }
 
     #[test]

@@ -1,7 +1,9 @@
 //! Runs the real binary in a directory of its own.
 #![allow(dead_code)]
 
+use std::collections::BTreeMap;
 use std::fs;
+use std::io::{Cursor, Read};
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 use tempfile::TempDir;
@@ -148,4 +150,43 @@ impl Outcome {
 pub fn damaged(from: &str, to: &str) -> String {
     assert!(SOUND.contains(from), "the sound design has no '{from}'");
     SOUND.replacen(from, to, 1)
+}
+
+/// A copy of the program with binaries of our own making beside it.
+pub fn installed(bench: &Bench, binaries: &[&str]) -> std::path::PathBuf {
+    let program = bench.path("bin/ftc-fmu");
+    fs::create_dir(bench.path("bin")).unwrap();
+    fs::copy(env!("CARGO_BIN_EXE_ftc-fmu"), &program).unwrap();
+    for binary in binaries {
+        let path = bench.path("bin").join(binary);
+        fs::create_dir_all(path.parent().unwrap()).unwrap();
+        fs::write(path, binary).unwrap();
+    }
+    program
+}
+
+/// Exports the design with this copy of the program.
+pub fn export(bench: &Bench, program: &Path, out: &str) -> std::process::Output {
+    Command::new(program)
+        .args(["export", FILE, "--out", out])
+        .current_dir(bench.path("."))
+        .output()
+        .unwrap()
+}
+
+/// The contents of an archive by name; they must be in alphabetical order.
+pub fn unzip(path: &Path) -> BTreeMap<String, Vec<u8>> {
+    let mut archive = zip::ZipArchive::new(Cursor::new(fs::read(path).unwrap())).unwrap();
+    let mut files = BTreeMap::new();
+    let mut order = Vec::new();
+    for index in 0..archive.len() {
+        let mut file = archive.by_index(index).unwrap();
+        let name = file.name().unwrap().into_owned();
+        let mut bytes = Vec::new();
+        file.read_to_end(&mut bytes).unwrap();
+        order.push(name.clone());
+        files.insert(name, bytes);
+    }
+    assert!(order.is_sorted(), "{order:?}");
+    files
 }

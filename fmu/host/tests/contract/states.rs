@@ -91,3 +91,43 @@ fn damaged_and_foreign_bytes_are_refused() {
         assert!(!it.read_bytes(&bytes).is_null());
     }
 }
+
+/// Bytes that somebody forged under a checksum that holds. Found by fuzzing: a state said to be
+/// "fatal" was taken, and then nothing could be done with the instance any more.
+#[test]
+fn forged_phases_and_sizes_are_refused() {
+    let pair = Pair::load();
+    let mut closed = pair.close(0.0);
+    run(&mut closed, 0, 5);
+    for (it, model) in [&closed.controller, &closed.plant]
+        .into_iter()
+        .zip(&pair.models)
+    {
+        let bytes = it.bytes();
+        let read = |at: usize, value: u8| {
+            let mut forged = bytes[..bytes.len() - 4].to_vec();
+            forged[at] = value;
+            let checksum = crc32fast::hash(&forged);
+            forged.extend(checksum.to_le_bytes());
+            it.read_bytes(&forged)
+        };
+        // A mark of 8 bytes, the length of the guid, the guid, the phase by its number.
+        let phase = 8 + 1 + model.guid.len();
+        assert_eq!(bytes[phase], 2, "step complete");
+        for savable in [0, 1, 2, 6, 7] {
+            assert!(!read(phase, savable).is_null(), "phase {savable}");
+        }
+        for never in [3, 4, 5, 8, 9, 255] {
+            assert!(read(phase, never).is_null(), "phase {never}");
+        }
+        // Whatever byte is forged: refused, or as good as any state.
+        let body = &bytes[..bytes.len() - 4];
+        for (at, byte) in body.iter().enumerate().skip(8) {
+            let state = read(at, byte ^ 0x55);
+            if !state.is_null() {
+                assert_eq!(it.restore(state), Status::Ok);
+                assert_eq!(it.reset(), Status::Ok, "byte {at}");
+            }
+        }
+    }
+}

@@ -1,6 +1,6 @@
 //! The page of one design: what happened in its scenario, with and without fault tolerance.
 
-mod events;
+pub mod events;
 mod facts;
 mod figures;
 mod tables;

@@ -1,0 +1,145 @@
+//! Random switched plants with certified designs, for benches and property tests.
+#![allow(dead_code, missing_docs)]
+
+use ftc::control::parameters::{Compensation, EstimatorMethod};
+use ftc::design::assembly::{
+    DatabaseSource, EstimatorSpec, KnownDisturbance, Request, Threshold, assemble,
+};
+use ftc::design::{ControlSpec, Design, Lyapunov, ObserverChoice, ObserverSpec, Signal, Signals};
+use ftc::plant::{Mode, OperatingPoint, SwitchedPlant, spectral_radius};
+use ftc::simulate::Scenario;
+use ftc::simulate::scenario::{ModeInterval, Waveform};
+use nalgebra::DMatrix;
+use rand_chacha::ChaCha8Rng;
+use rand_chacha::rand_core::{Rng, SeedableRng};
+
+/// Samples of the scenario a design comes with.
+pub const STEPS: u64 = 50_000;
+/// Standard deviation of every sensor's noise.
+pub const NOISE: f64 = 0.003;
+
+/// Seeded randomness.
+pub struct Dice(ChaCha8Rng);
+
+impl Dice {
+    pub fn seeded(seed: u64) -> Self {
+        Self(ChaCha8Rng::seed_from_u64(seed))
+    }
+    pub fn unit(&mut self) -> f64 {
+        (self.0.next_u64() >> 11) as f64 / (1u64 << 53) as f64
+    }
+    pub fn between(&mut self, low: f64, high: f64) -> f64 {
+        low + (high - low) * self.unit()
+    }
+    pub fn count(&mut self, low: usize, high: usize) -> usize {
+        low + (self.unit() * (high - low + 1) as f64) as usize
+    }
+    fn matrix(&mut self, rows: usize, columns: usize) -> DMatrix<f64> {
+        DMatrix::from_fn(rows, columns, |_, _| self.between(-1.0, 1.0))
+    }
+}
+
+fn mode(dice: &mut Dice, n: usize, m: usize, p: usize, output: &DMatrix<f64>) -> Mode {
+    let a = dice.matrix(n, n);
+    let radius = spectral_radius(&a).max(1e-3);
+    Mode {
+        name: "random".into(),
+        a: a * (dice.between(0.3, 0.85) / radius),
+        b: dice.matrix(n, m),
+        c: output.clone(),
+        e: dice.matrix(n, 1) * 0.3,
+        f: DMatrix::zeros(p, 1),
+        operating_point: OperatingPoint::zero(n, m, p),
+    }
+}
+
+fn signals(name: &str, count: usize) -> Vec<Signal> {
+    let signal = |i| Signal {
+        name: format!("{name}[{i}]"),
+        unit: None,
+        nominal: 1.0,
+        min: None,
+        max: None,
+    };
+    (1..=count).map(signal).collect()
+}
+
+/// A random plant with a certified design; draws until one exists.
+pub fn design(dice: &mut Dice) -> Design {
+    loop {
+        let (n, m, p) = (dice.count(1, 5), dice.count(1, 3), dice.count(1, 3));
+        let output = dice.matrix(p, n);
+        let plant = SwitchedPlant {
+            sample_time: dice.between(0.01, 1.0),
+            modes: (0..2).map(|_| mode(dice, n, m, p, &output)).collect(),
+        };
+        let dims = plant.dimensions();
+        let r = p.min(m).min(n);
+        let control = ControlSpec {
+            tracked: (0..r).collect(),
+            lyapunov: Lyapunov::Dwell,
+            decay: 0.95,
+            output_weight: vec![1.0; r],
+            integral_weight: vec![0.3 / plant.sample_time; r],
+            input_weight: vec![0.3; m],
+            ..ControlSpec::new(dims)
+        };
+        let period = dice.between(40.0, 300.0) * plant.sample_time;
+        let scenario = Scenario {
+            steps: STEPS,
+            noise: vec![NOISE; p],
+            seed: dice.0.next_u64(),
+            schedule: vec![ModeInterval { from: 0.0, mode: 0 }],
+            reference: (0..r)
+                .map(|_| Waveform::Square {
+                    amplitude: dice.between(0.2, 0.8),
+                    period: 400.0 * plant.sample_time,
+                    offset: 0.0,
+                })
+                .collect(),
+            fault: vec![Waveform::ZERO; p],
+            events: vec![],
+            disturbance: vec![Waveform::Sine {
+                amplitude: 0.05,
+                period,
+                phase: 0.0,
+                offset: 0.0,
+            }],
+        };
+        let request = Request {
+            name: "random".into(),
+            signals: Signals {
+                inputs: signals("u", m),
+                outputs: signals("y", p),
+                states: signals("x", n),
+            },
+            plant,
+            control,
+            bumpless: false,
+            observer: ObserverSpec {
+                kind: ObserverChoice::Auto,
+                decay: 0.9,
+                lyapunov: Lyapunov::Dwell,
+            },
+            estimator: EstimatorSpec {
+                method: EstimatorMethod::Reference,
+                response_length: None,
+                database: DatabaseSource::Commission,
+                threshold: Threshold::Sigmas(6.0),
+                debounce: 1,
+                adapt: false,
+                disturbance: Some(KnownDisturbance {
+                    period,
+                    harmonics: 1,
+                    amplitude: Some(vec![0.05]),
+                }),
+            },
+            compensation: Compensation::VirtualSensor,
+            truth: ftc::simulate::Truth::AsDesigned,
+            scenario,
+        };
+        if let Ok(design) = assemble(request) {
+            return design;
+        }
+    }
+}

@@ -1,0 +1,317 @@
+//! `verify` proves what an FMU promises, and notices whatever does not belong to it.
+#![allow(missing_docs)]
+
+mod common;
+
+use common::{Bench, FILE, Outcome, SOUND, export, installed, unzip};
+use serde_json::Value;
+use std::collections::BTreeMap;
+use std::fs;
+use std::io::{Cursor, Write};
+use zip::write::SimpleFileOptions;
+
+const DESIGN: &str = "resources/design.json";
+const CERTIFICATE: &str = "resources/certificate.json";
+const DESCRIPTION: &str = "modelDescription.xml";
+
+/// An exported controller, unpacked.
+struct Exported {
+    bench: Bench,
+    files: BTreeMap<String, Vec<u8>>,
+}
+
+impl Exported {
+    fn new(design: &str) -> Self {
+        let bench = Bench::new(design);
+        let program = installed(
+            &bench,
+            &[
+                "fmu-binaries/linux64/ftc_controller.so",
+                "fmu-binaries/linux64/ftc_plant.so",
+            ],
+        );
+        let output = export(&bench, &program, "out");
+        assert!(
+            output.status.success(),
+            "{}",
+            String::from_utf8_lossy(&output.stderr)
+        );
+        let files = unzip(&bench.path("out/sound_controller.fmu"));
+        Self { bench, files }
+    }
+
+    /// One file with its JSON changed.
+    fn change(&mut self, name: &str, change: impl Fn(&mut Value)) {
+        let mut value: Value = serde_json::from_slice(&self.files[name]).unwrap();
+        let before = value.clone();
+        change(&mut value);
+        assert_ne!(value, before, "nothing was changed in {name}");
+        self.files
+            .insert(name.into(), serde_json::to_vec(&value).unwrap());
+    }
+
+    /// Makes fingerprints fit the design again, as a careful forger would.
+    fn seal(&mut self) {
+        let design = self.files[DESIGN].clone();
+        let xml = String::from_utf8(self.files[DESCRIPTION].clone()).unwrap();
+        let (before, rest) = xml.split_once("guid=\"").unwrap();
+        let (_, after) = rest.split_once('"').unwrap();
+        let guid = model_description::guid(model_description::CONTROLLER, &design);
+        self.files.insert(
+            DESCRIPTION.into(),
+            format!("{before}guid=\"{guid}\"{after}").into_bytes(),
+        );
+        let fingerprint = model_description::guid("certificate", &design);
+        self.change(CERTIFICATE, |value| {
+            value["design"] = fingerprint.as_str().into()
+        });
+    }
+
+    fn verify(&self) -> Outcome {
+        let mut archive = zip::ZipWriter::new(Cursor::new(Vec::new()));
+        for (name, bytes) in &self.files {
+            archive
+                .start_file(name.as_str(), SimpleFileOptions::default())
+                .unwrap();
+            archive.write_all(bytes).unwrap();
+        }
+        self.verify_bytes(&archive.finish().unwrap().into_inner())
+    }
+
+    fn verify_bytes(&self, bytes: &[u8]) -> Outcome {
+        fs::write(self.bench.path("x.fmu"), bytes).unwrap();
+        self.bench.run(&["verify", "x.fmu", "--json"])
+    }
+
+    /// The verdict must be no, in one sentence with these words.
+    fn refused(&self, case: &str, code: i32, words: &[&str]) {
+        let run = self.verify();
+        assert_eq!(run.code(), code, "{case}: {}", run.stderr());
+        assert_eq!(run.stderr().trim_end().lines().count(), 1, "{case}");
+        for word in words {
+            assert!(run.stderr().contains(word), "{case}: {}", run.stderr());
+        }
+        if code == 1 {
+            assert_eq!(run.json()["verified"], false, "{case}");
+        }
+    }
+}
+
+fn scaled(value: &mut Value, factor: f64) {
+    *value = (value.as_f64().unwrap() * factor).into();
+}
+
+fn dwelling() -> String {
+    SOUND
+        .replace("\"common\"", "\"dwell\"")
+        .replace("decay = 0.7\noutput", "decay = 0.9\noutput")
+}
+
+#[test]
+fn both_fmus_are_proved_and_their_promises_printed() {
+    let exported = Exported::new(SOUND);
+    let report = exported.bench.run(&["design", FILE, "--json"]).json();
+    for kind in ["controller", "plant"] {
+        let path = format!("out/sound_{kind}.fmu");
+        let run = exported.bench.run(&["verify", &path, "--json"]);
+        assert_eq!(run.code(), 0, "{}", run.stderr());
+        let found = run.json();
+        assert_eq!(found["verified"], true);
+        assert_eq!(found["gamma"], report["gamma"]);
+        assert_eq!(found["state_feedback"]["decay"], 0.7);
+        assert_eq!(found["state_feedback"]["arbitrary_switching"], true);
+        assert_eq!(found["observer"]["arbitrary_switching"], true);
+        let run = exported.bench.run(&["verify", &path]);
+        for word in [
+            "proved",
+            "arbitrary switching",
+            "decay",
+            "l2 gain",
+            "nothing was solved",
+        ] {
+            assert!(run.stdout().contains(word), "{word}: {}", run.stdout());
+        }
+    }
+    assert_eq!(exported.verify().code(), 0, "packed again, it is the same");
+}
+
+#[test]
+fn a_dwell_time_is_proved_and_a_shorter_one_is_not() {
+    let mut exported = Exported::new(&dwelling());
+    let run = exported.verify();
+    assert_eq!(run.code(), 0, "{}", run.stderr());
+    let found = run.json();
+    assert_eq!(found["state_feedback"]["arbitrary_switching"], false);
+    assert!(
+        found["state_feedback"]["dwell_time_samples"]
+            .as_f64()
+            .unwrap()
+            > 1.0
+    );
+    exported.change(DESIGN, |design| {
+        let dwell = &mut design["synthesis"]["state_feedback"]["dwell"];
+        scaled(&mut dwell["samples"], 0.9);
+        scaled(&mut dwell["seconds"], 0.9);
+    });
+    exported.change(CERTIFICATE, |certificate| {
+        let dwell = &mut certificate["claims"]["state_feedback"]["dwell"];
+        scaled(&mut dwell["samples"], 0.9);
+        scaled(&mut dwell["seconds"], 0.9);
+    });
+    exported.seal();
+    exported.refused("shorter dwell time", 1, &[]);
+}
+
+#[test]
+fn parts_that_do_not_belong_together() {
+    let mut gain = Exported::new(SOUND);
+    gain.change(DESIGN, |design| {
+        scaled(
+            &mut design["controller"]["feedback"]["modes"][0]["state_feedback"][0][0],
+            1.0 + 1e-12,
+        );
+    });
+    gain.refused("tampered gain", 1, &["guid", DESIGN]);
+
+    let mut description = Exported::new(SOUND);
+    let other = Exported::new(&SOUND.replace("seed = 3", "seed = 4"));
+    description
+        .files
+        .insert(DESCRIPTION.into(), other.files[DESCRIPTION].clone());
+    description.refused("foreign description", 1, &["guid"]);
+
+    let mut certificate = Exported::new(SOUND);
+    certificate
+        .files
+        .insert(CERTIFICATE.into(), other.files[CERTIFICATE].clone());
+    certificate.refused("foreign certificate", 1, &[CERTIFICATE, "another design"]);
+
+    for (case, path, words) in [
+        ("gamma", "/claims/gamma/0", "claims"),
+        ("decay", "/claims/state_feedback/decay", "claims"),
+        ("observer", "/claims/observer/decay", "claims"),
+        (
+            "proof",
+            "/proof/state_feedback/lyapunov/0/core/0/0",
+            "proof",
+        ),
+    ] {
+        let mut exported = Exported::new(SOUND);
+        exported.change(CERTIFICATE, |value| {
+            scaled(value.pointer_mut(path).unwrap(), 0.99);
+        });
+        exported.refused(case, 1, &[CERTIFICATE, words]);
+    }
+}
+
+#[test]
+fn a_careful_forger_is_found_out() {
+    let mut running = Exported::new(SOUND);
+    running.change(DESIGN, |design| {
+        scaled(
+            &mut design["controller"]["feedback"]["modes"][1]["integral"][0][0],
+            1.0 + 1e-12,
+        );
+    });
+    running.seal();
+    running.refused("gain that runs", 1, &["mode 2", "integral gain", "proved"]);
+
+    let mut observer = Exported::new(SOUND);
+    observer.change(DESIGN, |design| {
+        let gains = &mut design["controller"]["observer"]["gains"][0];
+        let entry = first_number(gains).unwrap();
+        *entry = (entry.as_f64().unwrap() + 1e-12).into();
+    });
+    observer.seal();
+    observer.refused("observer that runs", 1, &["observer"]);
+
+    let mut both = Exported::new(SOUND);
+    both.change(DESIGN, |design| {
+        for part in ["/controller/feedback", "/synthesis/state_feedback"] {
+            let gains = format!("{part}/modes/0/state_feedback/0/0");
+            scaled(design.pointer_mut(&gains).unwrap(), 1.5);
+        }
+    });
+    both.seal();
+    both.refused("gain that runs and its copy", 1, &["could not be proved"]);
+
+    let mut plant = Exported::new(SOUND);
+    plant.change(DESIGN, |design| {
+        scaled(
+            &mut design["controller"]["plant"]["modes"][0]["a"][0][0],
+            1.3,
+        );
+    });
+    plant.seal();
+    plant.refused("another plant", 1, &["could not be proved"]);
+
+    let mut gamma = Exported::new(SOUND);
+    gamma.change(DESIGN, |design| {
+        for mode in 0..2 {
+            scaled(
+                &mut design["synthesis"]["state_feedback"]["gamma"][mode],
+                0.99,
+            );
+        }
+    });
+    gamma.change(CERTIFICATE, |certificate| {
+        for mode in 0..2 {
+            scaled(&mut certificate["claims"]["gamma"][mode], 0.99);
+        }
+    });
+    gamma.seal();
+    gamma.refused("gamma lowered", 1, &["attenuation", "could not be proved"]);
+}
+
+fn first_number(value: &mut Value) -> Option<&mut Value> {
+    match value {
+        Value::Number(_) => Some(value),
+        Value::Array(list) => list.iter_mut().find_map(first_number),
+        Value::Object(map) => map.values_mut().find_map(first_number),
+        _ => None,
+    }
+}
+
+#[test]
+fn what_is_missing_or_no_fmu_of_ours() {
+    for name in [DESIGN, CERTIFICATE, DESCRIPTION] {
+        let mut exported = Exported::new(SOUND);
+        exported.files.remove(name);
+        exported.refused(name, 2, &[name, "export"]);
+        let mut exported = Exported::new(SOUND);
+        exported.files.insert(name.into(), b"{".to_vec());
+        let code = if name == DESIGN { 1 } else { 2 };
+        exported.refused(name, code, &[name]);
+    }
+    let bench = Bench::new(SOUND);
+    for path in [FILE, ".", "none.fmu"] {
+        let run = bench.run(&["verify", path]);
+        assert_eq!(run.code(), 2, "{path}");
+        assert!(run.stderr().contains(path), "{}", run.stderr());
+    }
+}
+
+#[test]
+fn a_damaged_archive_is_never_taken_for_another_design() {
+    let exported = Exported::new(SOUND);
+    let bytes = fs::read(exported.bench.path("out/sound_controller.fmu")).unwrap();
+    let sound = exported.verify_bytes(&bytes).stdout();
+    for length in (0..bytes.len()).step_by(bytes.len() / 40) {
+        let run = exported.verify_bytes(&bytes[..length]);
+        assert_eq!(run.code(), 2, "{length} bytes: {}", run.stderr());
+    }
+    // Bits of time stamps and the like carry no meaning; every other one is noticed.
+    let mut noticed = 0;
+    let places: Vec<usize> = (0..bytes.len()).step_by(bytes.len() / 150).collect();
+    for &at in &places {
+        let mut flipped = bytes.clone();
+        flipped[at] ^= 0x10;
+        let run = exported.verify_bytes(&flipped);
+        match run.code() {
+            0 => assert_eq!(run.stdout(), sound, "byte {at}"),
+            1 | 2 => noticed += 1,
+            code => panic!("byte {at}: exit code {code}: {}", run.stderr()),
+        }
+    }
+    assert!(10 * noticed > 8 * places.len(), "{noticed}");
+}
