@@ -5,10 +5,26 @@ PYTHON ?= python3
 VENV := .venv
 IN_VENV := $(VENV)/bin/
 
-.PHONY: build test test-rust test-python demo bench fuzz soak memcheck lint clean
+ZIG := target/platforms/zig
+
+.PHONY: build fmu-linux64 fmu-all test test-rust test-python demo bench fuzz soak memcheck lint clean
 
 build:
 	cargo build --release --workspace
+
+# FMU binaries beyond those for this machine; `ftc-fmu export` packs whatever is built and is not
+# older than the program. The first needs glibc 2.17 only; the others see docs/platforms.md.
+fmu-linux64: build $(ZIG)/ready
+	PATH="$(CURDIR)/$(ZIG)/bin:$$PATH" tools/platforms/build.sh linux64
+
+fmu-all: build $(ZIG)/ready
+	PATH="$(CURDIR)/$(ZIG)/bin:$$PATH" tools/platforms/build.sh linux64 win64 aarch64-linux
+
+$(ZIG)/ready: tools/platforms/requirements.txt
+	rm -rf $(ZIG)
+	$(PYTHON) -m venv $(ZIG)
+	$(ZIG)/bin/pip install --quiet --disable-pip-version-check --requirement tools/platforms/requirements.txt
+	touch $@
 
 test: lint test-rust test-python
 

@@ -30,17 +30,19 @@ def ftc_fmu(*arguments: str | Path, accept: tuple[int, ...] = (0,)) -> str:
 
 @dataclass(frozen=True)
 class Exported:
-    """The pair of FMUs of one design."""
+    """The pair of FMUs of one design, and the package that connects them."""
 
     controller: Path
     plant: Path
+    package: Path
 
 
 def export(design: Path, folder: Path) -> Exported:
-    """Exports a design and returns its two FMUs."""
-    ftc_fmu("export", design, "--out", folder)
+    """Exports a design and returns its two FMUs and their package."""
+    ftc_fmu("export", design, "--out", folder, "--ssp")
     (controller,), (plant,) = folder.glob("*_controller.fmu"), folder.glob("*_plant.fmu")
-    return Exported(controller, plant)
+    (package,) = folder.glob("*.ssp")
+    return Exported(controller, plant, package)
 
 
 class Trajectories:
