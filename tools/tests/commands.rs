@@ -287,6 +287,7 @@ fn an_fmu_holds_every_platform_that_is_there_and_belongs_to_its_design() {
                 &format!("binaries/win64/sound_{kind}.dll"),
                 "documentation/index.html",
                 "documentation/licenses/license.txt",
+                "model.png",
                 "modelDescription.xml",
                 "resources/certificate.json",
                 "resources/design.json",
