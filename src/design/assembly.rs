@@ -90,6 +90,16 @@ pub struct KnownDisturbance {
     pub amplitude: Option<Vec<f64>>,
 }
 
+impl KnownDisturbance {
+    /// Angle per sample (radians) of each harmonic, for [`ControlSpec::resonators`].
+    pub fn angles(&self, sample_time: f64) -> Vec<f64> {
+        let fundamental = core::f64::consts::TAU * sample_time / self.period;
+        (1..=self.harmonics)
+            .map(|harmonic| harmonic as f64 * fundamental)
+            .collect()
+    }
+}
+
 /// The smallest threshold that is chosen automatically, relative to the nominal value.
 const SMALLEST_THRESHOLD: f64 = 1e-3;
 
@@ -129,6 +139,8 @@ const MOST_COEFFICIENTS: usize = 2000;
 /// [`DesignError::Request`] where the request is ill-formed, else what the synthesis says.
 pub fn assemble(request: Request) -> Result<Design, DesignError> {
     let dims = Dimensions::check(&request.plant).map_err(DesignError::Request)?;
+    let asked = request.control.check(dims);
+    asked.map_err(DesignError::Request)?;
     let estimator = estimator(&request, dims).map_err(DesignError::Request)?;
     let scaling = scaling(&request.signals);
     check_controllable(&request.plant, &request.control, &scaling).map_err(DesignError::Request)?;

@@ -10,7 +10,7 @@ use nalgebra::{Complex, DMatrix};
 const RANK_TOLERANCE: f64 = 1e-11;
 
 /// Checks by the Popov-Belevitch-Hautus test that every eigenvalue of every mode, the integrators'
-/// included, that decays more slowly than asked can be moved by the inputs.
+/// and the resonators' included, that decays more slowly than asked can be moved by the inputs.
 ///
 /// # Errors
 /// One sentence that names the mode and the eigenvalue.
@@ -39,6 +39,15 @@ pub fn check_controllable(
                 "mode {number}: (A, B) cannot hold the tracked outputs at arbitrary values, the pair with integral action is \
                  uncontrollable: track fewer outputs, or outputs on which the inputs act independently"
             ));
+        }
+        for (harmonic, angle) in spec.resonators.iter().enumerate() {
+            if !is_movable(model, Complex::from_polar(1.0, *angle)) {
+                return Err(format!(
+                    "mode {number}: the inputs cannot move the tracked outputs at harmonic {} of the disturbance, so no internal \
+                     model can reject it: use fewer harmonics, track fewer outputs, or set internal_model = false",
+                    harmonic + 1
+                ));
+            }
         }
     }
     Ok(())

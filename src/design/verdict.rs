@@ -84,6 +84,8 @@ pub enum Advice {
     LyapunovAndDecay(super::Lyapunov, f64),
     /// Track fewer outputs (indices from 0).
     Tracked(Vec<usize>),
+    /// Keep only so many of the internal model's harmonics.
+    Harmonics(usize),
 }
 
 impl Advice {
@@ -108,6 +110,7 @@ impl Advice {
                 changed.integral_weight = kept(&spec.integral_weight);
                 changed.tracked.clone_from(outputs);
             }
+            Self::Harmonics(count) => changed.resonators.truncate(*count),
         }
         changed
     }
@@ -127,6 +130,14 @@ impl fmt::Display for Advice {
             Self::LyapunovAndDecay(kind, decay) => write!(
                 f,
                 "another guarantee with a slower decay is feasible: lyapunov = \"{kind}\", decay = {decay}"
+            ),
+            Self::Harmonics(0) => write!(
+                f,
+                "integral action alone is feasible: internal_model = false"
+            ),
+            Self::Harmonics(count) => write!(
+                f,
+                "an internal model of fewer harmonics is feasible: harmonics = {count}"
             ),
             Self::Tracked(outputs) => {
                 let numbers: Vec<String> = outputs.iter().map(|o| (o + 1).to_string()).collect();

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
     from conftest import Case
 
-EXAMPLES = ["paper", "paper_output", "tank"]
+EXAMPLES = ["paper", "paper_output", "paper_internal_model", "tank"]
 pytestmark = pytest.mark.parametrize("example", EXAMPLES)
 
 

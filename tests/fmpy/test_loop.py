@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
     from conftest import Case
 
-EXAMPLES = ["paper", "paper_output", "tank"]
+EXAMPLES = ["paper", "paper_output", "paper_internal_model", "tank"]
 
 
 @pytest.mark.parametrize("example", EXAMPLES)

@@ -86,15 +86,25 @@ def bumpless() -> dict:
     return design
 
 
+def resonant() -> dict:
+    """Returns a delayed design with an internal model of two harmonics, whose inputs saturate and switch bumplessly."""
+    design = design_file.delayed()
+    design["name"] = "resonant"
+    design["signals"] = {"inputs": [{"min": -1.5, "max": 1.5}] * 2}
+    design["disturbance"]["harmonics"] = 2
+    design["controller"] |= {"internal_model": True, "decay": 0.98, "bumpless": True}
+    return design
+
+
 @pytest.mark.parametrize(
-    "design", [harsh(), displaced(), bumpless(), design_file.delayed()], ids=lambda design: design["name"]
+    "design", [harsh(), displaced(), bumpless(), design_file.delayed(), resonant()], ids=lambda design: design["name"]
 )
 def test_every_branch_of_the_on_line_path(make_case: Callable[[dict], Case], design: dict) -> None:
     """Saturation, lost and stuck sensors, harmonics, operating points, unequal sizes, bumpless switching, latency."""
     assert_agreement(make_case(design))
 
 
-@pytest.mark.parametrize("example", ["paper", "paper_output", "tank"])
+@pytest.mark.parametrize("example", ["paper", "paper_output", "paper_internal_model", "tank"])
 def test_shipped_example(example_case: Callable[[str], Case], example: str) -> None:
     """The examples a user copies."""
     assert_agreement(example_case(example))

@@ -36,13 +36,15 @@ const MOST_HARMONICS: usize = 50;
 /// One sentence that names the key and what to do.
 pub fn request(file: &DesignFile, folder: &Path) -> Result<Request, String> {
     at("name", check::identifier(&file.name))?;
-    refuse_unbuilt(file)?;
     let plant = plant(file)?;
     let dims = Dimensions::check(&plant)?;
     bearable(&plant, dims)?;
     let signals = signals(&file.signals, &plant, dims)?;
-    let control = control(&file.controller, &signals, dims)?;
     let disturbance = disturbance(file, dims)?;
+    let control = ControlSpec {
+        resonators: resonators(file, disturbance.as_ref())?,
+        ..control(&file.controller, &signals, dims)?
+    };
     let observer = observer(&file.observer, &control)?;
     let logs = Logs {
         plant: &plant,
@@ -77,16 +79,6 @@ pub fn request(file: &DesignFile, folder: &Path) -> Result<Request, String> {
 /// Puts the key before a complaint.
 fn at<T>(key: &str, result: Result<T, String>) -> Result<T, String> {
     result.map_err(|what| format!("{key} {what}"))
-}
-
-/// Says no to what the design file's contract knows and this release does not do.
-fn refuse_unbuilt(file: &DesignFile) -> Result<(), String> {
-    match file.controller.internal_model {
-        Some(true) => {
-            Err("controller.internal_model = true is not built yet: leave the key out".into())
-        }
-        _ => Ok(()),
-    }
 }
 
 /// What is simulated: the modes themselves, or the named model they are linearised from.
@@ -379,6 +371,22 @@ fn control(
         integral_weight,
         input_weight,
     })
+}
+
+/// The angles of the internal model's resonators; none where no internal model is wanted.
+fn resonators(
+    file: &DesignFile,
+    disturbance: Option<&KnownDisturbance>,
+) -> Result<Vec<f64>, String> {
+    let wanted = file.controller.internal_model;
+    match (wanted.unwrap_or(defaults::INTERNAL_MODEL), disturbance) {
+        (false, _) => Ok(Vec::new()),
+        (true, Some(known)) => Ok(known.angles(file.sample_time)),
+        (true, None) => Err(
+            "controller.internal_model = true needs to know the disturbance: give [disturbance] with its period"
+                .into(),
+        ),
+    }
 }
 
 fn lyapunov(kind: LyapunovKind) -> Lyapunov {

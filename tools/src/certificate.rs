@@ -133,6 +133,9 @@ pub fn covers_what_runs(design: &Design) -> Result<(), String> {
     if running.latency != proved.spec.latency {
         return Err(differs("the latency"));
     }
+    if running.resonators != proved.spec.resonators {
+        return Err(differs("the internal model"));
+    }
     let pairs = running.modes.iter().zip(&proved.modes);
     for (mode, (runs, gains)) in pairs.enumerate() {
         let parts = [

@@ -72,6 +72,7 @@ fn feedback(design: &Design, control: &StateFeedback) -> Vec<(String, String)> {
         line("latency", format!("{} samples", spec.latency)),
         line("decay asked", format!("{} per sample", spec.decay)),
     ];
+    lines.extend(internal_model(design, control));
     for (index, radius) in control.spectral_radius.iter().enumerate() {
         let gamma = control.gamma.as_ref().map(|gamma| gamma[index]);
         let gamma = gamma.map_or("no disturbance".into(), |gamma| format!("gamma {gamma:.4}"));
@@ -81,6 +82,17 @@ fn feedback(design: &Design, control: &StateFeedback) -> Vec<(String, String)> {
         ));
     }
     lines
+}
+
+/// The periods at which the tracking error vanishes beside its constant part.
+fn internal_model(design: &Design, control: &StateFeedback) -> Option<(String, String)> {
+    let sample_time = design.controller.plant.sample_time;
+    let angles = control.spec.resonators.iter();
+    let periods: Vec<String> = angles
+        .map(|angle| format!("{:.6} s", core::f64::consts::TAU / angle * sample_time))
+        .collect();
+    let named = || format!("resonators at periods {}", periods.join(", "));
+    (!periods.is_empty()).then(|| line("internal model", named()))
 }
 
 fn observer(design: &Design) -> Vec<(String, String)> {
@@ -202,6 +214,7 @@ pub fn json(design: &Design) -> String {
         "dwell_time_seconds": control.and_then(|c| c.dwell.map(|dwell| dwell.seconds)),
         "lyapunov": control.map(|c| c.spec.lyapunov),
         "latency": control.map(|c| c.spec.latency),
+        "resonators": control.map(|c| c.spec.resonators.clone()),
         "observer": {
             "kind": design.controller.observer.kind,
             "note": design.controller.observer.note,

@@ -373,6 +373,53 @@ fn no_mode_at_all() {
     refused("empty list of modes", empty, &["[[mode]]", "at least one"]);
 }
 
+/// The example of a named model, damaged.
+#[test]
+fn a_named_model() {
+    let converter = include_str!("../../examples/converter.toml");
+    for (what, from, to, words) in [
+        (
+            "unknown model",
+            "\"rectifier\"",
+            "\"inverter\"",
+            &["plant", "rectifier"][..],
+        ),
+        (
+            "missing parameter",
+            "resistance = 0.3",
+            "",
+            &["plant", "resistance"],
+        ),
+        (
+            "negative capacitance",
+            "capacitance = 2e-3",
+            "capacitance = -2e-3",
+            &["plant.capacitance", "positive"],
+        ),
+        (
+            "no load",
+            "loads = [80.0, 40.0]",
+            "loads = []",
+            &["plant.loads", "one per mode"],
+        ),
+        (
+            "a load the grid cannot supply",
+            "loads = [80.0, 40.0]",
+            "loads = [80.0, 0.1]",
+            &["plant", "mode 2", "load resistance"],
+        ),
+        (
+            "modes as well",
+            "[plant]",
+            "[[mode]]\nA = [[0.5]]\nB = [[1.0]]\nC = [[1.0]]\n[plant]",
+            &["[plant]", "[[mode]]", "exclude"],
+        ),
+    ] {
+        assert!(converter.contains(from), "{what}");
+        refused(what, converter.replacen(from, to, 1), words);
+    }
+}
+
 #[test]
 fn signals_and_disturbance() {
     all_refused(&[
@@ -539,10 +586,21 @@ fn controller_and_observer() {
             &["controller.input_weight has 1 entries"],
         ),
         (
-            "internal model",
-            "latency = 0",
-            "internal_model = true",
-            &["controller.internal_model", "not built yet"],
+            "internal model of an unknown disturbance",
+            "[disturbance]\nperiod = 314.0\nharmonics = 1\n\n[controller]\n",
+            "[controller]\ninternal_model = true\n",
+            &["controller.internal_model", "[disturbance]"],
+        ),
+        (
+            "internal model of a disturbance that hardly moves",
+            "period = 314.0\nharmonics = 1\n\n[controller]\n",
+            "period = 31400.0\nharmonics = 1\n\n[controller]\ninternal_model = true\n",
+            &[
+                "harmonic 1",
+                "31400",
+                "sample_time",
+                "internal_model = false",
+            ],
         ),
         (
             "observer decay above 1",

@@ -48,16 +48,18 @@ fn every_example_is_designed_and_simulated() {
         let metrics: Value =
             serde_json::from_slice(&fs::read(bench.path("out/metrics.json")).unwrap()).unwrap();
         let mse = |variant: &str| numbers(&metrics[variant]["mse"]["true"]);
-        for ((ftc, without), told) in mse("ftc")
+        // On a nonlinear plant an estimate carries what the linearisation misses; the thresholds
+        // of the example, 5 V and 0.6 A, are twice that.
+        let nonlinear = path.ends_with("converter.toml");
+        let missed = if nonlinear { [2.5, 0.3] } else { [0.0; 2] };
+        for (((ftc, without), told), missed) in mse("ftc")
             .iter()
             .zip(mse("no_ftc"))
             .zip(mse("told_the_fault"))
+            .zip(missed)
         {
-            // On the nonlinear plant an estimate carries what the linearisation misses.
-            let nonlinear = path.ends_with("converter.toml");
-            let bound = if nonlinear { 2.0 } else { 1.05 };
             assert!(
-                *ftc <= bound * told,
+                *ftc <= 1.05 * told + missed * missed,
                 "{}: {ftc} against {told}",
                 path.display()
             );
@@ -285,6 +287,7 @@ fn an_fmu_holds_every_platform_that_is_there_and_belongs_to_its_design() {
                 &format!("binaries/win64/sound_{kind}.dll"),
                 "documentation/index.html",
                 "documentation/licenses/license.txt",
+                "model.png",
                 "modelDescription.xml",
                 "resources/certificate.json",
                 "resources/design.json",

@@ -216,6 +216,27 @@ fn a_careful_forger_is_found_out() {
     running.seal();
     running.refused("gain that runs", 1, &["mode 2", "integral gain", "proved"]);
 
+    for (case, key, value) in [
+        ("the latency", "latency", serde_json::json!(1)),
+        (
+            "the internal model",
+            "resonators",
+            serde_json::json!([0.02]),
+        ),
+        (
+            "the choice of tracked outputs",
+            "tracked",
+            serde_json::json!([1, 0]),
+        ),
+    ] {
+        let mut changed = Exported::new(SOUND);
+        changed.change(DESIGN, |design| {
+            design["controller"]["feedback"][key] = value.clone();
+        });
+        changed.seal();
+        changed.refused(case, 1, &[case, "not what was proved"]);
+    }
+
     let mut observer = Exported::new(SOUND);
     observer.change(DESIGN, |design| {
         let gains = &mut design["controller"]["observer"]["gains"][0];

@@ -43,10 +43,25 @@ struct Spans {
 }
 
 /// Everything that changes at run time.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, PartialEq, Serialize, Deserialize)]
 pub struct State {
     sum: Vec<f64>,
     ticks: u64,
+}
+
+impl Clone for State {
+    fn clone(&self) -> Self {
+        Self {
+            sum: self.sum.clone(),
+            ..*self
+        }
+    }
+
+    /// Copies in place: on line nothing may be allocated.
+    fn clone_from(&mut self, source: &Self) {
+        self.sum.clone_from(&source.sum);
+        self.ticks = source.ticks;
+    }
 }
 
 /// `in[1..2]`, `ref`, `mode`, `mode_real`, `gain`, `start_at_one`, `early[1..2]`,

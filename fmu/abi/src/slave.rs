@@ -38,6 +38,7 @@ impl From<&str> for Refusal {
 /// belongs into `State`, sized by [`Slave::initial_state`].
 pub trait Slave: Sized + 'static {
     /// Everything that changes at run time, including scratch that a later tick reads.
+    /// Its `clone_from` must copy in place: states are saved and tried between two ticks.
     type State: Clone + Serialize + DeserializeOwned + 'static;
 
     /// Loads the model from the FMU's unpacked `resources` folder.

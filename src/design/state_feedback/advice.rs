@@ -23,6 +23,11 @@ pub(super) fn search(plant: &SwitchedPlant, spec: &ControlSpec, scaling: &Scalin
     });
     advice.extend(other);
     advice.extend(fewer_outputs(spec, &feasible).map(Advice::Tracked));
+    let fewer_harmonics = (0..spec.resonators.len())
+        .rev()
+        .map(Advice::Harmonics)
+        .find(|fewer| feasible(&fewer.apply(spec)));
+    advice.extend(fewer_harmonics);
     advice
 }
 

@@ -23,6 +23,9 @@ const SACRIFICES: [f64; 4] = [2e-5, 1e-4, 1e-3, 1e-2];
 /// A margin below this is no margin: the solver's own accuracy.
 const SMALLEST_MARGIN: f64 = 1e-9;
 
+/// A margin beyond doubt.
+const SURE_MARGIN: f64 = 1e-6;
+
 /// A margin above this needs no better coordinates.
 const THICK_MARGIN: f64 = 1e-2;
 
@@ -76,38 +79,30 @@ pub(super) fn is_feasible(plant: &SwitchedPlant, spec: &ControlSpec, scaling: &S
     let models = augment(plant, spec, &units);
     spec.lyapunov.groups(models.len()).iter().all(|group| {
         let found = stable(&models, spec, group);
-        found.is_ok_and(|(margin, parts)| parts.is_some() && margin.margin > 1e3 * SMALLEST_MARGIN)
+        found.is_ok_and(|(margin, parts)| parts.is_some() && margin.margin >= SURE_MARGIN)
     })
 }
 
 /// Stabilising gains of a group with their margin, sought in the design's coordinates and, where
-/// these show none, in those of a regulator; no gains where neither does.
+/// these show hardly any, in those of a regulator; no gains where neither does.
 fn stable(
     models: &[AugmentedMode],
     spec: &ControlSpec,
     group: &[usize],
 ) -> Result<(Margin, Option<Vec<Part>>), SolverFailure> {
     let (margin, parts) = theorem::stabilise(models, spec, group)?;
-    if margin.margin >= SMALLEST_MARGIN {
+    if margin.margin >= SURE_MARGIN {
         return Ok((margin, Some(parts)));
     }
-    let again = Frame::of_regulated(models, group, spec.decay)
-        .and_then(|frame| surely_stable(&frame, models, spec, group));
-    Ok(match again {
+    let regulated = Frame::of_regulated(models, group, spec.decay).and_then(|frame| {
+        let (margin, parts) = theorem::stabilise(&frame.view(models), spec, group).ok()?;
+        (margin.margin >= SURE_MARGIN).then(|| (margin, frame.restore(parts)))
+    });
+    Ok(match regulated {
         Some((margin, parts)) => (margin, Some(parts)),
+        None if margin.margin >= SMALLEST_MARGIN => (margin, Some(parts)),
         None => (margin, None),
     })
-}
-
-/// Stabilising gains with a margin beyond doubt, sought in given coordinates.
-fn surely_stable(
-    frame: &Frame,
-    models: &[AugmentedMode],
-    spec: &ControlSpec,
-    group: &[usize],
-) -> Option<(Margin, Vec<Part>)> {
-    let (margin, parts) = theorem::stabilise(&frame.view(models), spec, group).ok()?;
-    (margin.margin >= 1e3 * SMALLEST_MARGIN).then(|| (margin, frame.restore(parts)))
 }
 
 /// The gains solved for again in the coordinates they suggest, as long as the margin is thin and

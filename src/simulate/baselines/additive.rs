@@ -25,7 +25,7 @@ pub fn additive(design: &Design) -> Result<ControllerParameters, DesignError> {
     parameters.compensation = Compensation::Additive;
     parameters.feedback = feedback(
         &control,
-        &design.controller.plant,
+        plant,
         design.controller.feedback.bumpless,
         &parameters.input_limits,
     );

@@ -45,6 +45,8 @@ pub const OUTPUT_WEIGHT: f64 = 1.0;
 pub const INTEGRAL_WEIGHT: f64 = 0.3;
 /// `controller.input_weight`, per unit of the nominal value.
 pub const INPUT_WEIGHT: f64 = 0.1;
+/// `controller.internal_model`
+pub const INTERNAL_MODEL: bool = false;
 /// `controller.bumpless`
 pub const BUMPLESS: bool = false;
 /// `observer.kind`

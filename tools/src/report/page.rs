@@ -243,12 +243,18 @@ impl Block {
 }
 
 impl Table {
+    /// Whether it is text to be read: on a phone its cells then stand below one another.
+    fn is_prose(&self) -> bool {
+        let words = |column: &&Column| column.kind == ColumnKind::Words;
+        self.columns.iter().filter(words).count() > 1
+    }
+
     fn render(&self) -> Markup {
         let caption = clean(&self.caption);
         html! {
             p.caption { (caption) }
             div.table role="region" tabindex="0" aria-label=(caption) {
-                table {
+                table.prose[self.is_prose()] {
                     thead {
                         tr {
                             @for column in &self.columns { th scope="col" class=(column.kind.class()) { (clean(&column.name)) } }
@@ -258,7 +264,7 @@ impl Table {
                         @for row in &self.rows {
                             tr.emphasised[row.emphasised].group[row.begins_group] {
                                 @for (cell, column) in row.cells.iter().zip(&self.columns) {
-                                    td class=(column.kind.class()) { (clean(cell)) }
+                                    td class=(column.kind.class()) data-label=(clean(&column.name)) { (clean(cell)) }
                                 }
                             }
                         }

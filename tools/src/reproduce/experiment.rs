@@ -91,7 +91,7 @@ pub fn switches(run: &Trajectory, design: &Design) -> Vec<Mark> {
         .filter(|pair| pair[0].mode != pair[1].mode)
         .map(|pair| Mark {
             at: pair[1].tick as f64 * te,
-            label: format!("{} mode", modes[pair[1].mode].name),
+            label: format!("mode {}: {}", pair[1].mode + 1, modes[pair[1].mode].name),
         })
         .collect()
 }

@@ -156,7 +156,14 @@ pub fn damaged(from: &str, to: &str) -> String {
 pub fn installed(bench: &Bench, binaries: &[&str]) -> std::path::PathBuf {
     let program = bench.path("bin/ftc-fmu");
     fs::create_dir(bench.path("bin")).unwrap();
-    fs::copy(env!("CARGO_BIN_EXE_ftc-fmu"), &program).unwrap();
+    // Another process copies: a child that another test starts meanwhile would inherit our open
+    // file, and a program that is open for writing cannot be run.
+    let copied = Command::new("cp")
+        .arg(env!("CARGO_BIN_EXE_ftc-fmu"))
+        .arg(&program)
+        .status()
+        .unwrap();
+    assert!(copied.success());
     for binary in binaries {
         let path = bench.path("bin").join(binary);
         fs::create_dir_all(path.parent().unwrap()).unwrap();

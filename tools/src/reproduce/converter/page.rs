@@ -1,7 +1,7 @@
 //! The page of the converter.
 
 use super::{CONTENDERS, FAULTY, HORIZON, INPUT_WEIGHT, REPORTED, Trial, name};
-use crate::report::events::{any_fault_intervals, fault_intervals};
+use crate::report::events::fault_intervals;
 use crate::report::figure::{Figure, Ink, Series, Weight};
 use crate::report::page::{Block, Column, KeyNumber, Page, Row, Section, Table};
 use crate::report::text::{aligned, number, significant, with_unit};
@@ -13,7 +13,13 @@ use ftc::simulate::{Trajectory, Truth, Variant};
 const RIVALS: [Variant; 2] = [Variant::Ftc, Variant::Predictive];
 
 /// Faults whose curves are drawn, by key.
-const DRAWN: [&str; 4] = ["v_bias", "v_gain_loss", "v_dropout", "i_gain_loss"];
+const DRAWN: [&str; 5] = [
+    "v_bias",
+    "v_gain_loss",
+    "v_stuck",
+    "v_dropout",
+    "i_gain_loss",
+];
 
 /// Everything, the comparison first.
 pub fn page(design: &Design, trials: &[Trial]) -> Page {
@@ -108,13 +114,10 @@ fn key_numbers(trials: &[Trial]) -> Vec<KeyNumber> {
             "faults under which the proposed FTC is ahead",
         ),
         key(
-            format!("{} %", healthy(Variant::Ftc)),
-            "VAF without fault, voltage / current, proposed FTC",
+            healthy(Variant::Ftc),
+            "VAF (%) without fault: voltage / current, proposed FTC",
         ),
-        key(
-            format!("{} %", healthy(Variant::Predictive)),
-            "the same with MPC",
-        ),
+        key(healthy(Variant::Predictive), "the same with MPC"),
     ]
 }
 
@@ -245,7 +248,7 @@ fn notes(trials: &[Trial]) -> Vec<String> {
     notes
 }
 
-/// Output, fault estimate and command under one fault.
+/// Output and fault estimate under one fault.
 fn drawn(design: &Design, trial: &Trial) -> Option<Section> {
     let (sensor, _) = trial.case.fault?;
     let run = trial.of(Variant::Ftc)?;
@@ -254,7 +257,6 @@ fn drawn(design: &Design, trial: &Trial) -> Option<Section> {
     let section = Section::new(capitalised(&heading)).figures(vec![
         response(design, trial, run, &rivals, sensor),
         estimate(design, trial, run, sensor),
-        command(design, trial, run, &rivals, sensor),
     ]);
     Some(section)
 }
@@ -324,33 +326,6 @@ fn estimate(design: &Design, trial: &Trial, run: &Trajectory, sensor: usize) -> 
             .step(),
     )
     .with(Series::new("estimate", found).step())
-}
-
-/// The command of the input that moves the faulty output: one each, in the same order.
-fn command(
-    design: &Design,
-    trial: &Trial,
-    run: &Trajectory,
-    rivals: &[&Trajectory],
-    sensor: usize,
-) -> Figure {
-    let te = design.controller.plant.sample_time;
-    let input = &design.signals.inputs[sensor];
-    let mut figure = figure(
-        run,
-        design,
-        (
-            format!("{}-input", trial.case.key),
-            capitalised(&input.name),
-            with_unit(&input.name, input.unit.as_deref()),
-        ),
-        &any_fault_intervals(run),
-    );
-    for rival in rivals {
-        let points = curve(rival, te, |record| record.u[sensor]);
-        figure = figure.with(series(name(rival.variant), rival.variant, points).step());
-    }
-    figure
 }
 
 /// MSE and VAF, true and measured.

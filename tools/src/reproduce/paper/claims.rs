@@ -78,8 +78,13 @@ impl Claims {
 
     fn theorem(&self, index: usize, name: &str) -> Claim {
         let verdict = &self.theorems[index];
+        let rounding = if verdict.margin.abs() < 1e-8 {
+            ", zero but for rounding"
+        } else {
+            ""
+        };
         let found = format!(
-            "{}: the best margin of its inequalities is {}",
+            "{}: the best margin of its inequalities is {}{rounding}",
             if verdict.feasible {
                 "feasible"
             } else {

@@ -227,16 +227,16 @@ fn reach(record: &Record) -> Table {
         ),
         columns: vec![
             Column::name("reference"),
-            Column::number("its variance"),
-            Column::number("MSE one sample late"),
+            Column::number("variance"),
+            Column::number("deadbeat MSE"),
             Column::number("VAF (%)"),
-            Column::number("MSE proposed"),
+            Column::number("proposed MSE"),
             Column::number("VAF (%)"),
             Column::words("verdict"),
         ],
         rows: rows.collect(),
         notes: vec![
-            "One sample late: the output repeats the reference of the sample before, from rest. No causal controller of \
+            "Deadbeat: the output repeats the reference one sample late, from rest. No causal controller of \
              this plant has a smaller mean square error, whatever it knows of the fault."
                 .into(),
         ],
