@@ -4,13 +4,15 @@
 #
 #     tools/platforms/toolchain.sh aarch64-unknown-linux-gnu
 #
+# With `packages NAME...` it unpacks just those, into $UNPACK_INTO.
+#
 # Runs on a Debian machine (amd64) as any user; does nothing that was done before.
 set -euo pipefail
 cd "$(dirname "$0")/../.."
 
 target=$1
 home=$PWD/target/platforms
-root=$home/rust
+root=${UNPACK_INTO:-$home/rust}
 apt=(
     -qq -o Dir::State::lists="$home/apt/lists" -o Dir::Cache="$home/apt/cache"
     -o Dir::State::status="$home/apt/status" -o APT::Architectures::=amd64 -o APT::Architectures::=arm64
@@ -29,6 +31,12 @@ unpack() {
     done
     rm -rf "$home/packages"
 }
+
+if [ "$target" = packages ]; then
+    shift
+    unpack "$@"
+    exit
+fi
 
 version() {
     apt-cache "${apt[@]}" depends libstd-rust-web-dev:amd64 | sed -n 's/.*Depends: \(libstd-rust-web-[0-9.]*\).*/\1/p' | head -1
