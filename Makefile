@@ -34,7 +34,7 @@ test: lint test-rust test-python
 
 # In release mode: the design's optimisation problems are solved many times over, and the Python
 # tests need the release binaries anyway.
-test-rust:
+test-rust: build
 	cargo test --release --workspace
 
 test-python: build $(VENV)/ready
