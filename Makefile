@@ -7,7 +7,7 @@ IN_VENV := $(VENV)/bin/
 
 ZIG := target/platforms/zig
 
-.PHONY: build fmu-linux64 fmu-all test test-rust test-python demo bench fuzz soak memcheck lint clean
+.PHONY: build fmu-linux64 fmu-all compare-platforms test test-rust test-python demo bench fuzz soak memcheck lint clean
 
 # The FMU binaries are made by themselves, with the profile meant for them: built with the whole
 # workspace they would carry the solver's symbols along.
@@ -23,6 +23,10 @@ fmu-linux64: build $(ZIG)/ready
 
 fmu-all: build $(ZIG)/ready
 	PATH="$(CURDIR)/$(ZIG)/bin:$$PATH" tools/platforms/build.sh linux64 win64 aarch64-linux
+
+# Closes an example's loop on every platform built, under wine and qemu, and compares the bits.
+compare-platforms: fmu-all $(VENV)/ready
+	PYTHONPATH=tests/support $(IN_VENV)python tests/platforms/compare.py examples/paper.toml
 
 $(ZIG)/ready: tools/platforms/requirements.txt
 	rm -rf $(ZIG)

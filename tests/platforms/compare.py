@@ -32,6 +32,7 @@ COMPILERS = {
     "win64": ["x86_64-w64-mingw32-gcc", "-D__USE_MINGW_ANSI_STDIO=1"],
     "aarch64-linux": [ZIG, "-m", "ziglang", "cc", "-target", "aarch64-linux-gnu.2.17"],
 }
+LIBRARIES = {"linux64": ["-ldl"], "win64": [], "aarch64-linux": ["-ldl"]}
 
 
 def system_of(platform: str) -> list[str | Path]:
@@ -65,14 +66,20 @@ def connections(sides: dict[str, fmpy.model_description.ModelDescription]) -> li
 def run(platform: str, fmus: commands.Exported, folder: Path) -> tuple[str, float]:
     """Runs the loop on a platform and returns what it printed and the seconds it took."""
     program = folder / f"closed_loop_{platform}.exe"
-    subprocess.run([*COMPILERS[platform], *FLAGS, "-o", program, SOURCE], check=True)
+    subprocess.run([*COMPILERS[platform], *FLAGS, "-o", program, SOURCE, *LIBRARIES[platform]], check=True)
+    if platform == "win64":
+        prng = Path(__file__).with_name("bcryptprimitives.c")
+        subprocess.run(
+            [*COMPILERS[platform], "-shared", "-o", folder / "bcryptprimitives.dll", prng, "-ladvapi32"], check=True
+        )
     sides, arguments = {}, []
     for side, fmu in (("c", fmus.controller), ("p", fmus.plant)):
         unpacked = folder / f"{platform}_{side}"
         fmpy.extract(fmu, unpacked)
         sides[side] = fmpy.read_model_description(unpacked)
         (library,) = (unpacked / "binaries" / platform).iterdir()
-        arguments += [library, sides[side].guid, uri(unpacked / "resources", platform)]
+        path = "Z:" + str(library).replace("/", "\\") if platform == "win64" else library
+        arguments += [path, sides[side].guid, uri(unpacked / "resources", platform)]
     size = str(sides["p"].defaultExperiment.stepSize)
     command = [*system_of(platform), program, *arguments, size, str(STEPS), *connections(sides)]
     start = time.perf_counter()
