@@ -1,4 +1,4 @@
-/* Wine before 9 has no bcryptprimitives.dll, of which Rust's standard library wants this function. */
+/* Wine 8.0 has no bcryptprimitives.dll, of which Rust's standard library wants this function. */
 #include <windows.h>
 #include <ntsecapi.h>
 
