@@ -316,16 +316,12 @@ class Loop:
         ]
         return scenario.active_mode(plan["schedule"], tick, te), *values
 
-    def command(
-        self, mode: int, x_hat: np.ndarray, Z: np.ndarray, y_ref: np.ndarray, u_old: np.ndarray
-    ) -> np.ndarray:
+    def command(self, mode: int, x_hat: np.ndarray, Z: np.ndarray, y_ref: np.ndarray, u_old: np.ndarray) -> np.ndarray:
         """Returns the command before saturation: u0 + K (x_hat - x0) + G Z + N (y_ref - S y0) + V (u_old - u0)."""
         feedback = self.design["controller"]["feedback"]
         gains = feedback["modes"][mode]
         point = self.modes[mode]
-        K, G, N, V = (
-            np.array(gains[key]) for key in ("state_feedback", "integral", "feedforward", "previous_input")
-        )
+        K, G, N, V = (np.array(gains[key]) for key in ("state_feedback", "integral", "feedforward", "previous_input"))
         u = point.u0 + K @ (x_hat - point.x0) + G @ Z
         if N.size:
             u = u + N @ (y_ref - point.y0[feedback["tracked"]])
