@@ -119,9 +119,14 @@ impl PlantSimulator {
         &self.scenario
     }
 
+    /// The mode (0-based) in which the scenario begins.
+    pub fn first_mode(&self) -> usize {
+        self.scenario.mode(0, self.plant.sample_time)
+    }
+
     /// At rest in the scenario's first mode, tick 0, outputs not yet observed.
     pub fn initial_state(&self) -> PlantState {
-        self.initial_state_in(self.scenario.mode(0, self.plant.sample_time))
+        self.initial_state_in(self.first_mode())
     }
 
     /// At rest at the operating point of `mode` (0-based), tick 0, outputs not yet observed.

@@ -1,6 +1,6 @@
 //! A full run of one instance: everything an importer may do between initialization and the end.
 
-use crate::Instance;
+use crate::{Functions, Instance, Model, allocations};
 use fmu_abi::types::Status;
 use model_description::{Causality, Kind, Span, Variable};
 
@@ -84,4 +84,27 @@ pub fn exercise(it: &Instance, ticks: u32) -> impl FnMut() + use<> {
             }
         }
     }
+}
+
+/// Asserts that a full run allocates nothing from fmi2ExitInitializationMode to fmi2Terminate.
+///
+/// `before_exit` is called in initialization mode, `after_exit` when the run begins.
+pub fn assert_nothing_is_allocated(
+    functions: Functions,
+    model: &Model,
+    before_exit: impl FnOnce(&Instance),
+    after_exit: impl FnOnce(&Instance),
+) {
+    let it = Instance::new(functions, model).expect("an instance");
+    it.silence();
+    it.initialize(0.0, before_exit);
+    let mut run = exercise(&it, 900);
+    let on_line = || {
+        after_exit(&it);
+        run();
+        // SAFETY: the instance lives.
+        assert_eq!(unsafe { (functions.terminate)(it.c) }, Status::Ok);
+    };
+    assert_eq!(allocations(on_line), 0);
+    assert!(allocations(|| drop(it)) > 0, "the counter counts");
 }
