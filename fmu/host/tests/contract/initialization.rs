@@ -13,9 +13,18 @@ fn two_resting_places() -> Design {
     design
 }
 
-/// The controller, or the plant with its scenario off; and the names of the mode's Integer and
-/// of an output that shows the mode.
-fn instances(count: usize) -> Vec<(&'static str, &'static str, Vec<Instance>, Library)> {
+/// Some instances of one FMU.
+struct Side {
+    /// Name of the mode's Integer.
+    mode: &'static str,
+    /// An output that shows the mode.
+    shown: &'static str,
+    made: Vec<Instance>,
+    _library: Library,
+}
+
+/// The controller, and the plant with its scenario off.
+fn sides(count: usize) -> [Side; 2] {
     let design = two_resting_places();
     [
         ("mode", "u", "ftc_controller", Model::controller(&design)),
@@ -31,10 +40,13 @@ fn instances(count: usize) -> Vec<(&'static str, &'static str, Vec<Instance>, Li
             }
             it
         };
-        let made = (0..count).map(make).collect();
-        (mode, shown, made, library)
+        Side {
+            mode,
+            shown,
+            made: (0..count).map(make).collect(),
+            _library: library,
+        }
     })
-    .into()
 }
 
 fn initialize(it: &Instance, mode: &str, number: i32) {
@@ -53,15 +65,12 @@ fn warnings(it: &Instance) -> Vec<String> {
 
 #[test]
 fn an_unknown_mode_starts_in_the_nearest_with_a_warning() {
-    for (mode, shown, made, _library) in instances(5) {
-        let [low, first, high, second, negative] = made.try_into().unwrap_or_else(|_| panic!());
-        for (it, number) in [
-            (&low, 0),
-            (&negative, -7),
-            (&first, 1),
-            (&high, 9),
-            (&second, 2),
-        ] {
+    for side in sides(5) {
+        let (mode, shown) = (side.mode, side.shown);
+        let [low, first, high, second, negative] = &side.made[..] else {
+            unreachable!()
+        };
+        for (it, number) in [(low, 0), (negative, -7), (first, 1), (high, 9), (second, 2)] {
             initialize(it, mode, number);
             let known = [1, 2].contains(&number);
             assert_eq!(warnings(it).len(), usize::from(!known), "{mode} = {number}");
@@ -84,18 +93,21 @@ fn an_unknown_mode_starts_in_the_nearest_with_a_warning() {
 
 #[test]
 fn a_mode_that_comes_late_is_as_good_as_one_that_came_in_time() {
-    for (mode, shown, made, _library) in instances(3) {
-        let [late, copy, in_time] = made.try_into().unwrap_or_else(|_| panic!());
-        initialize(&late, mode, 0);
-        initialize(&in_time, mode, 2);
+    for side in sides(3) {
+        let (mode, shown) = (side.mode, side.shown);
+        let [late, copy, in_time] = &side.made[..] else {
+            unreachable!()
+        };
+        initialize(late, mode, 0);
+        initialize(in_time, mode, 2);
         // That the start is provisional is part of a saved state.
         assert_eq!(copy.restore(copy.read_bytes(&late.bytes())), Status::Ok);
-        for it in [&late, &copy] {
+        for it in [late, copy] {
             assert_eq!(it.step(0.0, 0.5), Status::Error);
             assert!(it.last_message().contains(&format!("{mode} is 0")));
             assert_eq!(it.set_integer(it.span(mode), 2), Status::Ok);
         }
-        let slopes = [&late, &copy, &in_time].map(|it| {
+        let slopes = [late, copy, in_time].map(|it| {
             let known = it.span(if mode == "mode" { "y" } else { "u" });
             let mut out = [f64::NAN; 2];
             let status = it.derivative(it.span(shown), known, &[1.0, -2.0], &mut out);
@@ -105,7 +117,7 @@ fn a_mode_that_comes_late_is_as_good_as_one_that_came_in_time() {
         assert_eq!(slopes[0], slopes[2]);
         assert_eq!(slopes[1], slopes[2]);
         for (from, length) in [(0.0, 0.5), (0.5, 0.5), (1.0, 3.0)] {
-            for it in [&late, &copy, &in_time] {
+            for it in [late, copy, in_time] {
                 assert_eq!(it.step(from, length), Status::Ok, "{}", it.last_message());
             }
             assert_eq!(late.get(shown), in_time.get(shown));
@@ -117,8 +129,8 @@ fn a_mode_that_comes_late_is_as_good_as_one_that_came_in_time() {
 
 #[test]
 fn what_is_no_number_is_still_refused_in_initialization_mode() {
-    for (mode, _, made, _library) in instances(1) {
-        let it = &made[0];
+    for side in sides(1) {
+        let (mode, it) = (side.mode, &side.made[0]);
         it.enter(0.0);
         let name = if mode == "mode" { "y_ref" } else { "u" };
         assert_eq!(it.set(it.span(name), &[f64::NAN]), Status::Ok);
