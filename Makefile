@@ -7,6 +7,10 @@ IN_VENV := $(VENV)/bin/
 
 ZIG := target/platforms/zig
 
+# Which cargo-fuzz; it is compiled into this folder, not installed.
+FUZZER := cargo-fuzz@0.13.1
+TOOLS := $(CURDIR)/target/tools
+
 .PHONY: build fmu-linux64 fmu-all compare-platforms test test-rust test-python demo bench fuzz soak memcheck lint clean
 
 # The FMU binaries are made by themselves, with the profile meant for them: built with the whole
@@ -50,13 +54,21 @@ demo: build $(VENV)/ready
 bench: build
 	cargo bench --workspace
 
-# Fuzzing needs cargo-fuzz and a C++ compiler; SECONDS and TARGETS may be set.
+# Fuzzing needs a C++ compiler; each of TARGETS runs for SECONDS, ABREAST of them side by side.
 SECONDS ?= 30
 TARGETS ?= controller_calls plant_calls controller_design plant_design state location
+ABREAST ?= 1
+FUZZ := RUSTC_BOOTSTRAP=1 PATH="$(TOOLS)/bin:$$PATH" cargo fuzz
+IN_FUZZ := --fuzz-dir fmu/fuzz --target-dir target/fuzz
 
-fuzz:
-	cd fmu/fuzz && for target in $(TARGETS); do RUSTC_BOOTSTRAP=1 \
-		cargo fuzz run --fuzz-dir . $$target -- -max_total_time=$(SECONDS) -rss_limit_mb=4096 || exit 1; done
+fuzz: $(TOOLS)/$(FUZZER)
+	$(FUZZ) build $(IN_FUZZ)
+	printf '%s\n' $(TARGETS) | xargs -P $(ABREAST) -I TARGET sh -c '$(FUZZ) run $(IN_FUZZ) TARGET -- \
+		-max_total_time=$(SECONDS) -rss_limit_mb=4096 -print_final_stats=1'
+
+$(TOOLS)/$(FUZZER):
+	cargo install --quiet --locked --root $(TOOLS) $(FUZZER)
+	touch $@
 
 TICKS ?= 100000000
 
