@@ -45,8 +45,9 @@ test: lint test-rust test-python
 test-rust: build
 	cargo test --release --workspace
 
+# PYTEST may hold options, such as --nothing-skipped.
 test-python: build $(VENV)/ready
-	$(IN_VENV)python -m pytest
+	$(IN_VENV)python -m pytest $(PYTEST)
 
 demo: build $(VENV)/ready
 	PYTHONPATH=tests/support $(IN_VENV)python tests/fmpy/demo.py examples/paper.toml out/demo
