@@ -11,7 +11,7 @@ ZIG := target/platforms/zig
 FUZZER := cargo-fuzz@0.13.1
 TOOLS := $(CURDIR)/target/tools
 
-.PHONY: build fmu-linux64 fmu-all compare-platforms test test-rust test-python demo bench fuzz soak memcheck lint clean
+.PHONY: build fmu-linux64 fmu-all compare-platforms test test-rust test-python demo bench fuzz soak memcheck threadcheck lint clean
 
 # The FMU binaries are made by themselves, with the profile meant for them: built with the whole
 # workspace they would carry the solver's symbols along.
@@ -76,9 +76,14 @@ TICKS ?= 100000000
 soak:
 	cargo run --release --package fmu-host --example soak -- $(TICKS)
 
-# valgrind's memcheck over the C program of tests/c on both FMUs.
+# valgrind over the C programs of tests/c on both FMUs: its memcheck on one instance and its twin,
+# its two checkers of threads on eight threads with two loops each.
 memcheck: build $(VENV)/ready
-	PYTHONPATH=tests/support $(IN_VENV)python tests/support/c_host.py examples/paper.toml
+	PYTHONPATH=tests/support $(IN_VENV)python tests/support/c_host.py memcheck examples/paper.toml
+
+threadcheck: build $(VENV)/ready
+	PYTHONPATH=tests/support $(IN_VENV)python tests/support/c_host.py helgrind examples/paper.toml
+	PYTHONPATH=tests/support $(IN_VENV)python tests/support/c_host.py drd examples/paper.toml
 
 lint: $(VENV)/ready
 	cargo fmt --all --check
