@@ -3,6 +3,7 @@
 use crate::archive::{self, Contents};
 use crate::certificate::{self, Certificate};
 use crate::output::Staging;
+use crate::report::page::{Block, Page, Section};
 use crate::ssp::{self, Component, System};
 use crate::summary;
 use ftc::design::Design;
@@ -315,33 +316,17 @@ fn host_library(binary: &str) -> String {
 
 /// A page with the design report.
 fn documentation(design: &Design, kind: &Kind) -> String {
-    let mut body = String::new();
-    for (title, lines) in summary::sections(design) {
-        let _ = writeln!(body, "<h2>{title}</h2>\n<table>");
-        for (name, value) in lines {
-            let _ = writeln!(
-                body,
-                "<tr><th>{}</th><td>{}</td></tr>",
-                escape(&name),
-                escape(&value)
-            );
-        }
-        body.push_str("</table>\n");
+    let section = |(title, lines): summary::Section| Section::new(title).with(Block::Facts(lines));
+    Page {
+        title: format!("{}: {}", design.name, kind.suffix),
+        lead: format!("{}.", kind.description),
+        sections: summary::sections(design).into_iter().map(section).collect(),
+        footer: format!(
+            "Made by ftc-fmu {} from the design “{}”.",
+            env!("CARGO_PKG_VERSION"),
+            design.name
+        ),
+        ..Page::default()
     }
-    format!(
-        "<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n<title>{name} {suffix}</title>\n\
-         <style>body{{font-family:sans-serif;max-width:50em;margin:2em auto;padding:0 1em}}\
-         table{{border-collapse:collapse}}th{{text-align:left;font-weight:normal;color:#555;padding-right:2em;\
-         vertical-align:top}}td,th{{padding-top:.2em}}</style>\n</head>\n<body>\n\
-         <h1>{name}: {suffix}</h1>\n<p>{description}.</p>\n{body}</body>\n</html>\n",
-        name = escape(&design.name),
-        suffix = kind.suffix,
-        description = kind.description,
-    )
-}
-
-fn escape(text: &str) -> String {
-    text.replace('&', "&amp;")
-        .replace('<', "&lt;")
-        .replace('>', "&gt;")
+    .render()
 }
