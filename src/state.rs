@@ -9,17 +9,17 @@ pub trait State: Clone {
     fn same_shape(&self, other: &Self) -> bool;
 }
 
-impl State for f64 {
-    fn same_shape(&self, _: &Self) -> bool {
-        true
-    }
+macro_rules! scalars {
+    ($($scalar:ty),*) => {
+        $(impl State for $scalar {
+            fn same_shape(&self, _: &Self) -> bool {
+                true
+            }
+        })*
+    };
 }
 
-impl State for bool {
-    fn same_shape(&self, _: &Self) -> bool {
-        true
-    }
-}
+scalars!(f64, u32, bool);
 
 impl<T: State> State for Vec<T> {
     fn same_shape(&self, other: &Self) -> bool {

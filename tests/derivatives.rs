@@ -103,12 +103,13 @@ proptest! {
     #![proptest_config(ProptestConfig::with_cases(300))]
 
     #[test]
-    fn the_controller_follows_its_measurement(
+    fn the_controller_follows_its_measurement_and_reference(
         design in design(),
         ticks in 1..120u64,
         switch in 0..120u64,
         fault in prop::sample::select(vec![0.0, 0.4, f64::NAN]),
         direction in prop::array::uniform2(-1.0..1.0f64),
+        steering in prop::array::uniform2(-1.0..1.0f64),
         reference in prop::array::uniform2(-1.0..1.0f64),
         believe in any::<bool>(),
     ) {
@@ -128,20 +129,20 @@ proptest! {
             let fault = if tick + 20 > ticks { fault } else { 0.0 };
             let y = [x[0] + fault, x[1] + 0.01 * (tick as f64).sin()];
             let mode = usize::from(tick >= switch);
-            let sample = |y: &[f64; 2], state: &mut ControllerState, derive: Option<&[f64; 2]>| {
+            let sample = |y: &[f64; 2], reference: &[f64; 2], state: &mut ControllerState, derive: Option<ftc::control::Change<'_>>| {
                 let sample = Sample {
-                    tick, mode, measurement: y, reference: &reference, thresholds: &thresholds, compensate,
+                    tick, mode, measurement: y, reference, thresholds: &thresholds, compensate,
                 };
                 match derive {
-                    Some(dy) => controller.differentiate(state, &sample, dy),
+                    Some(change) => controller.differentiate(state, &sample, change),
                     None => controller.tick(state, &sample),
                 }
             };
             if tick == ticks {
                 let mut points = [-STEP, STEP].map(|step| {
-                    let moved = [y[0] + step * direction[0], y[1] + step * direction[1]];
+                    let along = |at: [f64; 2], way: [f64; 2]| [at[0] + step * way[0], at[1] + step * way[1]];
                     let mut trial = state.clone();
-                    sample(&moved, &mut trial, None);
+                    sample(&along(y, direction), &along(reference, steering), &mut trial, None);
                     trial
                 });
                 let [below, above] = &mut points;
@@ -150,10 +151,11 @@ proptest! {
                     .map(|(below, above)| (above - below) / (2.0 * STEP)).collect();
                 let largest = outputs(below).iter().fold(1.0, |most: f64, v| most.max(v.abs()));
                 let mut trial = state.clone();
-                sample(&y, &mut trial, Some(&direction));
+                let change = ftc::control::Change { measurement: &direction, reference: &steering };
+                sample(&y, &reference, &mut trial, Some(change));
                 last = Some((unmoved, expected, outputs(&trial), largest));
             }
-            sample(&y, &mut state, None);
+            sample(&y, &reference, &mut state, None);
         }
         let (unmoved, expected, found, largest) = last.unwrap();
         let rounding = 100.0 * f64::EPSILON * largest / STEP;

@@ -64,6 +64,7 @@ fn design(channel: Channel, control: ControlSpec) -> Design {
         },
         plant: plant(channel),
         bumpless: false,
+        feedforward: true,
         observer: ObserverSpec {
             kind: ObserverChoice::Auto,
             decay: 0.7,
@@ -75,6 +76,7 @@ fn design(channel: Channel, control: ControlSpec) -> Design {
             database: DatabaseSource::Commission,
             threshold: Threshold::Sigmas(6.0),
             debounce: 1,
+            stuck_after: 0,
             adapt: false,
             disturbance: Some(disturbance(1)),
         },

@@ -76,6 +76,7 @@ fn design(model: &SwitchedPlant, truth: &SwitchedPlant, noise: f64) -> Design {
         truth: ftc::simulate::Truth::AsDesigned,
         control,
         bumpless: false,
+        feedforward: true,
         observer,
         estimator: EstimatorSpec {
             method: EstimatorMethod::Reference,
@@ -90,6 +91,7 @@ fn design(model: &SwitchedPlant, truth: &SwitchedPlant, noise: f64) -> Design {
             ),
             threshold: Threshold::Sigmas(6.0),
             debounce: 1,
+            stuck_after: 0,
             adapt: false,
             disturbance: Some(KnownDisturbance {
                 period: core::f64::consts::TAU / 0.02,

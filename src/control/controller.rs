@@ -2,12 +2,15 @@
 
 mod derivative;
 
+pub use derivative::Change;
+
 use super::compensation::{self, AdditiveControl};
 use super::estimator::{EstimatorState, Observation};
 use super::integrator;
 use super::kernel;
 use super::observer::{ObservedMode, ObserverState};
 use super::parameters::{Compensation, ControllerParameters, FeedbackGains, Limits};
+use super::repetition::Repetition;
 use crate::plant::OperatingPoint;
 use crate::state::State;
 use serde::{Deserialize, Serialize};
@@ -52,6 +55,8 @@ pub enum Compensate<'a> {
 pub struct ControllerState {
     /// Mode of the last tick; none before the first.
     mode: Option<usize>,
+    /// Which sensors repeat themselves.
+    repetition: Repetition,
     /// State observer.
     pub observer: ObserverState,
     /// Fault estimator.
@@ -78,8 +83,8 @@ pub struct ControllerState {
 
 crate::state::state!(ControllerState {
     parts: [
-        observer, estimator, integral, additive, command, corrected, acting, deviation, excess,
-        substitute, no_fault
+        repetition, observer, estimator, integral, additive, command, corrected, acting, deviation,
+        excess, substitute, no_fault
     ],
     constants: [],
     counters: [mode]
@@ -115,6 +120,7 @@ impl Controller {
         let point = &self.parameters.plant.modes[mode].operating_point;
         ControllerState {
             mode: None,
+            repetition: Repetition::new(dims.outputs),
             observer: ObserverState::new(&point.x, dims.outputs),
             estimator: EstimatorState::new(&self.parameters.estimator, &point.u, dims.outputs),
             integral: vec![0.0; self.parameters.feedback.integral_size()],
@@ -140,14 +146,17 @@ impl Controller {
         };
         let point = &described.operating_point;
         let left = self.enter(state, mode, sample.thresholds);
+        let settings = &self.parameters.estimator;
         state.estimator.observe(
-            &self.parameters.estimator,
+            settings,
             &Observation {
                 tick: sample.tick,
                 mode,
                 u0: &point.u,
                 y0: &point.y,
-                y: sample.measurement,
+                y: state
+                    .repetition
+                    .screen(sample.measurement, settings.stuck_after),
                 thresholds: sample.thresholds,
             },
         );
@@ -160,9 +169,9 @@ impl Controller {
             &state.corrected,
         );
         if left != mode && self.parameters.feedback.bumpless {
-            self.transfer(state, mode, point);
+            self.transfer(state, mode, point, sample.reference);
         }
-        self.command(state, mode, point, sample.compensate);
+        self.command(state, mode, point, sample);
         self.advance(state, model, mode, sample);
     }
 
@@ -203,7 +212,7 @@ impl Controller {
         };
         compensation::correct(
             &mut state.corrected,
-            sample.measurement,
+            readings(&state.repetition, sample),
             fault,
             &state.substitute,
         );
@@ -211,13 +220,19 @@ impl Controller {
     }
 
     /// Moves the integral part so that the mode just entered repeats the last command.
-    fn transfer(&self, state: &mut ControllerState, mode: usize, point: &OperatingPoint) {
+    fn transfer(
+        &self,
+        state: &mut ControllerState,
+        mode: usize,
+        point: &OperatingPoint,
+        reference: &[f64],
+    ) {
         let Some(gains) = self.parameters.feedback.modes.get(mode) else {
             return;
         };
         kernel::copy(&mut state.excess, &state.command);
         kernel::copy(&mut state.acting, &state.command);
-        feedback(state, gains, point);
+        self.feedback(state, gains, point, reference);
         for (jump, &new) in state.excess.iter_mut().zip(&state.command) {
             *jump -= new;
         }
@@ -232,7 +247,7 @@ impl Controller {
         state: &mut ControllerState,
         mode: usize,
         point: &OperatingPoint,
-        compensate: Compensate<'_>,
+        sample: &Sample<'_>,
     ) {
         let Some(gains) = self.parameters.feedback.modes.get(mode) else {
             return;
@@ -240,9 +255,9 @@ impl Controller {
         if self.parameters.feedback.latency > 0 {
             kernel::copy(&mut state.acting, &state.command);
         }
-        feedback(state, gains, point);
+        self.feedback(state, gains, point, sample.reference);
         if let Some(additive) = &mut state.additive
-            && compensate == Compensate::Estimate
+            && sample.compensate == Compensate::Estimate
         {
             let fault = &state.estimator.fault;
             additive.add_to(
@@ -262,6 +277,27 @@ impl Controller {
             &mut state.excess,
             &self.parameters.input_limits,
         );
+    }
+
+    /// `u = u0 + K (x_hat - x0) + G Z + N (y_ref - S y0) + V (u_prev - u0)`.
+    fn feedback(
+        &self,
+        state: &mut ControllerState,
+        gains: &FeedbackGains,
+        point: &OperatingPoint,
+        reference: &[f64],
+    ) {
+        kernel::copy(&mut state.command, &point.u);
+        kernel::difference(&mut state.deviation, &state.observer.estimate, &point.x);
+        kernel::add_product(&mut state.command, &gains.state_feedback, &state.deviation);
+        kernel::add_product(&mut state.command, &gains.integral, &state.integral);
+        let targets = reference.iter().zip(&self.parameters.feedback.tracked);
+        for (asked, (&target, &row)) in state.deviation.iter_mut().zip(targets) {
+            *asked = target - point.y.get(row).copied().unwrap_or(0.0);
+        }
+        kernel::add_product(&mut state.command, &gains.feedforward, &state.deviation);
+        kernel::difference(&mut state.deviation, &state.acting, &point.u);
+        kernel::add_product(&mut state.command, &gains.previous_input, &state.deviation);
     }
 
     /// Moves observer, integrator and input history to the next sample.
@@ -296,14 +332,12 @@ impl Controller {
     }
 }
 
-/// `u = u0 + K (x_hat - x0) + G Z + V (u_prev - u0)`.
-fn feedback(state: &mut ControllerState, gains: &FeedbackGains, point: &OperatingPoint) {
-    kernel::copy(&mut state.command, &point.u);
-    kernel::difference(&mut state.deviation, &state.observer.estimate, &point.x);
-    kernel::add_product(&mut state.command, &gains.state_feedback, &state.deviation);
-    kernel::add_product(&mut state.command, &gains.integral, &state.integral);
-    kernel::difference(&mut state.deviation, &state.acting, &point.u);
-    kernel::add_product(&mut state.command, &gains.previous_input, &state.deviation);
+/// What the sensors say (p): who believes them, or knows their fault, believes a frozen one too.
+fn readings<'a>(repetition: &'a Repetition, sample: &Sample<'a>) -> &'a [f64] {
+    match sample.compensate {
+        Compensate::Estimate => repetition.screened(),
+        Compensate::Known(_) | Compensate::Nothing => sample.measurement,
+    }
 }
 
 /// Clamps each command to its limits and keeps in `excess` what was taken off (clamped - wanted).

@@ -16,6 +16,7 @@ pub mod integrator;
 pub mod kernel;
 pub mod observer;
 pub mod parameters;
+pub mod repetition;
 
-pub use controller::{Compensate, Controller, ControllerState, Sample};
+pub use controller::{Change, Compensate, Controller, ControllerState, Sample};
 pub use parameters::ControllerParameters;

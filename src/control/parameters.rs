@@ -62,9 +62,14 @@ impl StateFeedback {
     pub fn integral_size(&self) -> usize {
         self.tracked.len() * (1 + 2 * self.resonators.len())
     }
+
+    /// Whether the reference acts on the command at once.
+    pub fn has_feedforward(&self) -> bool {
+        self.modes.iter().any(|gains| !gains.feedforward.is_empty())
+    }
 }
 
-/// The gains of one mode: `u = u0 + K (x - x0) + G Z + V (u_prev - u0)`.
+/// The gains of one mode: `u = u0 + K (x - x0) + G Z + N (y_ref - S y0) + V (u_prev - u0)`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct FeedbackGains {
     /// `K_i` (m x n).
@@ -73,6 +78,10 @@ pub struct FeedbackGains {
     /// `G_i` (m x q); `q = r` without resonators.
     #[serde(with = "rows")]
     pub integral: DMatrix<f64>,
+    /// `N_i` (m x r; zero columns without feedforward): what a new reference does to the command
+    /// before the integrators have taken it in.
+    #[serde(with = "rows")]
+    pub feedforward: DMatrix<f64>,
     /// Gain on the command still acting (m x m; zero columns when latency is 0).
     #[serde(with = "rows")]
     pub previous_input: DMatrix<f64>,
@@ -150,6 +159,9 @@ pub struct Estimator {
     pub thresholds: Vec<f64>,
     /// Consecutive samples needed to raise or release a fault.
     pub debounce: u32,
+    /// Repetitions of the very same reading after which a sensor is taken for frozen, and then as
+    /// if it were silent; 0: never.
+    pub stuck_after: u32,
     /// Above this leverage the input lies outside what the database spans, and no decision is taken.
     pub leverage_limit: f64,
     /// Largest magnitude an estimate may take, per sensor (p).

@@ -29,6 +29,8 @@ pub struct Request {
     pub control: ControlSpec,
     /// Whether a mode switch leaves the command where it was.
     pub bumpless: bool,
+    /// Whether the reference acts on the command at once, or by way of the integrator alone.
+    pub feedforward: bool,
     /// The observer that is asked for.
     pub observer: ObserverSpec,
     /// The fault estimator that is asked for.
@@ -52,6 +54,8 @@ pub struct EstimatorSpec {
     pub threshold: Threshold,
     /// Consecutive samples that raise or release a fault.
     pub debounce: u32,
+    /// Repetitions of the very same reading after which a sensor is taken for frozen; 0: never.
+    pub stuck_after: u32,
     /// Whether the response goes on being learned while all is well.
     pub adapt: bool,
     /// The periodic disturbance to be learned on line.
@@ -155,6 +159,7 @@ pub fn assemble(request: Request) -> Result<Design, DesignError> {
         &synthesis.state_feedback,
         &request.plant,
         request.bumpless,
+        request.feedforward,
         &input_limits,
     );
     Ok(Design {
@@ -193,16 +198,23 @@ fn limits(inputs: &[Signal]) -> Vec<Limits> {
     inputs.iter().map(of).collect()
 }
 
-/// The certified gains as the controller runs them. What saturation takes off an input unwinds
+/// The certified gains as the controller runs them, with or without reference feedforward. What saturation takes off an input unwinds
 /// the integral by half of what would undo it; inputs without a limit never saturate.
 pub(crate) fn feedback(
     control: &super::StateFeedback,
     plant: &SwitchedPlant,
     bumpless: bool,
+    feedforward: bool,
     limits: &[Limits],
 ) -> StateFeedback {
     let mut feedback = control.for_controller(plant);
     feedback.bumpless = bumpless;
+    if feedforward {
+        let found = super::feedforward::feedforward(plant, control);
+        for (gains, gain) in feedback.modes.iter_mut().zip(found) {
+            gains.feedforward = gain;
+        }
+    }
     for gains in &mut feedback.modes {
         for (mut column, limit) in gains.anti_windup.column_iter_mut().zip(limits) {
             let limited = limit.min.is_some() || limit.max.is_some();
@@ -247,6 +259,7 @@ fn estimator(request: &Request, dims: Dimensions) -> Result<Estimator, String> {
         harmonic_transfers,
         thresholds,
         debounce: spec.debounce,
+        stuck_after: spec.stuck_after,
         leverage_limit: LEVERAGE_LIMIT,
         largest_fault: outputs.iter().map(largest_fault).collect(),
     })

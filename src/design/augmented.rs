@@ -3,7 +3,8 @@
 //! With `x~ = [x; u_prev; Z]` (`u_prev` only under latency 1) a mode reads
 //!
 //! ```text
-//! x~(k+1) = A x~(k) + B u(k) + E w(k)       Z(k+1) = Z(k) - Te S (C x(k) + F w(k))    (2), (19), (24)
+//! x~(k+1) = A x~(k) + B u(k) + E w(k) + R y_ref(k)                                 (2), (19), (24)
+//! Z(k+1)  = Z(k) + Te (y_ref(k) - S (C x(k) + F w(k)))
 //! v(k)    = H x~(k) + D u(k)                v = [W_y S C x; W_z Z; W_u u]
 //! ```
 //!
@@ -12,7 +13,8 @@
 //! integrator is:
 //!
 //! ```text
-//! a(k+1) = cos a(k) - sin b(k) - Te S (C x(k) + F w(k))       b(k+1) = sin a(k) + cos b(k)
+//! a(k+1) = cos a(k) - sin b(k) + Te (y_ref(k) - S (C x(k) + F w(k)))
+//! b(k+1) = sin a(k) + cos b(k)
 //! ```
 //!
 //! Sine and cosine are the very doubles the controller turns by. Both states of a pair have the unit
@@ -32,6 +34,8 @@ pub struct AugmentedMode {
     pub b: DMatrix<f64>,
     /// Disturbance matrix (d x s).
     pub e: DMatrix<f64>,
+    /// Reference matrix (d x r); the reference is in physical units.
+    pub r: DMatrix<f64>,
     /// State to performance signal ((r + q + m) x d).
     pub h: DMatrix<f64>,
     /// Input to performance signal ((r + q + m) x m).
@@ -57,6 +61,7 @@ fn augment_mode(mode: &Mode, sample_time: f64, spec: &ControlSpec, units: &Units
     let mut a = DMatrix::zeros(size, size);
     let mut b = DMatrix::zeros(size, m);
     let mut e = DMatrix::zeros(size, s);
+    let mut reference = DMatrix::zeros(size, r);
     let mut h = DMatrix::zeros(r + q + m, size);
     let mut d = DMatrix::zeros(r + q + m, m);
 
@@ -87,6 +92,7 @@ fn augment_mode(mode: &Mode, sample_time: f64, spec: &ControlSpec, units: &Units
             a[(z, first_z + column)] = value;
         }
         if of.driven {
+            reference[(z, of.row)] = sample_time / unit;
             for k in 0..n {
                 let c = mode.c[(output, k)] * units.states[k];
                 a[(z, k)] = -sample_time * (c / unit);
@@ -100,7 +106,14 @@ fn augment_mode(mode: &Mode, sample_time: f64, spec: &ControlSpec, units: &Units
     for k in 0..m {
         d[(r + q + k, k)] = spec.input_weight[k] * (units.inputs[k] / units.performance);
     }
-    AugmentedMode { a, b, e, h, d }
+    AugmentedMode {
+        a,
+        b,
+        e,
+        r: reference,
+        h,
+        d,
+    }
 }
 
 /// One state of the integral part.

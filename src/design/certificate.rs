@@ -281,7 +281,7 @@ fn check_dwell(dwell: &DwellTime, decay: f64, sample_time: f64) -> Result<(), Ce
 }
 
 /// `K~ = [K, K_u, G]` in the certificate's units.
-fn scaled_gain(gains: &ModeGains, units: &Units, spec: &ControlSpec) -> DMatrix<f64> {
+pub(crate) fn scaled_gain(gains: &ModeGains, units: &Units, spec: &ControlSpec) -> DMatrix<f64> {
     let m = units.inputs.len();
     let previous = if spec.latency == 0 { 0 } else { m };
     let (n, integral_part) = (units.states.len(), units.integral_part(spec));

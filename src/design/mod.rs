@@ -10,6 +10,8 @@ pub mod augmented;
 pub mod certificate;
 pub mod commissioning;
 mod controllability;
+#[cfg(feature = "design")]
+mod feedforward;
 pub mod harmonics;
 #[cfg(feature = "design")]
 pub mod lmi;

@@ -8,7 +8,7 @@ use crate::simulate::{Scenario, Truth};
 use serde::{Deserialize, Serialize};
 
 /// Version of the record's layout; an FMU refuses a record of another.
-pub const FORMAT: u32 = 1;
+pub const FORMAT: u32 = 2;
 
 /// A finished design.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]

@@ -77,6 +77,7 @@ impl StateFeedback {
             FeedbackGains {
                 state_feedback: gains.state_feedback.clone(),
                 integral: gains.integral.clone(),
+                feedforward: DMatrix::zeros(gains.integral.nrows(), 0),
                 previous_input: gains.previous_input.clone(),
                 anti_windup: integral_inverse.clone(),
                 integral_inverse,

@@ -109,6 +109,7 @@ pub fn controller(channel: Channel, noise: f64) -> ControllerParameters {
         integral_inverse: integral.clone().try_inverse().unwrap(),
         output_feedback: state_feedback.clone(), // both states are measured
         state_feedback,
+        feedforward: &integral * plant.sample_time,
         integral,
         previous_input: DMatrix::zeros(2, 0),
         anti_windup: DMatrix::zeros(2, 2),
@@ -190,6 +191,7 @@ pub fn controller(channel: Channel, noise: f64) -> ControllerParameters {
             ),
             thresholds,
             debounce: 1,
+            stuck_after: 0,
             leverage_limit: 100.0,
             largest_fault: vec![1e6; 2],
         },

@@ -116,6 +116,7 @@ pub fn design(dice: &mut Dice) -> Design {
             plant,
             control,
             bumpless: false,
+            feedforward: true,
             observer: ObserverSpec {
                 kind: ObserverChoice::Auto,
                 decay: 0.9,
@@ -127,6 +128,7 @@ pub fn design(dice: &mut Dice) -> Design {
                 database: DatabaseSource::Commission,
                 threshold: Threshold::Sigmas(6.0),
                 debounce: 1,
+                stuck_after: 0,
                 adapt: false,
                 disturbance: Some(KnownDisturbance {
                     period,

@@ -25,7 +25,7 @@ use std::path::Path;
 const LARGEST_SIZE: usize = 64;
 /// The most samples of a scenario.
 const MOST_STEPS: usize = 1_000_000;
-/// The longest debounce in samples.
+/// The longest debounce in samples, and the most repetitions of a reading.
 const LONGEST_DEBOUNCE: usize = 10_000;
 /// The most harmonics of a disturbance.
 const MOST_HARMONICS: usize = 50;
@@ -69,6 +69,7 @@ pub fn request(file: &DesignFile, folder: &Path) -> Result<Request, String> {
         truth: truth(file),
         control,
         bumpless: file.controller.bumpless.unwrap_or(defaults::BUMPLESS),
+        feedforward: file.controller.feedforward.unwrap_or(defaults::FEEDFORWARD),
         observer,
         estimator,
         compensation: compensation(file),
@@ -522,12 +523,20 @@ fn estimator(
             check::count(samples, 1, LONGEST_DEBOUNCE),
         )? as u32,
     };
+    let stuck_after = match given.stuck_after {
+        None => defaults::STUCK_AFTER,
+        Some(samples) => at(
+            "estimator.stuck_after",
+            check::count(samples, 0, LONGEST_DEBOUNCE),
+        )? as u32,
+    };
     Ok(EstimatorSpec {
         method,
         response_length,
         database: database(given, logs)?,
         threshold: threshold(given, dims)?,
         debounce,
+        stuck_after,
         adapt: given.adapt.unwrap_or(defaults::ADAPT),
         disturbance,
     })

@@ -147,6 +147,12 @@ fn estimator(design: &Design) -> Vec<(String, String)> {
         "debounce",
         count(estimator.debounce as usize, "sample"),
     ));
+    if estimator.stuck_after > 0 {
+        lines.push(line(
+            "stuck after",
+            format!("{} repetitions of a reading", estimator.stuck_after),
+        ));
+    }
     if let Some(harmonics) = &estimator.harmonics {
         lines.push(line(
             "disturbance",
@@ -236,6 +242,7 @@ pub fn json(design: &Design) -> String {
             "residual_deviation": deviations,
             "thresholds": estimator.thresholds,
             "debounce": estimator.debounce,
+            "stuck_after": estimator.stuck_after,
         },
     });
     pretty(&value)

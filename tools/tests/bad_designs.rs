@@ -659,6 +659,12 @@ fn the_estimator() {
             &["estimator.debounce is 0"],
         ),
         (
+            "stuck_after negative",
+            "debounce = 1",
+            "stuck_after = -1",
+            &["estimator.stuck_after is -1"],
+        ),
+        (
             "response length 0",
             "debounce = 1",
             "response_length = 0",

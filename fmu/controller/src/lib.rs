@@ -6,7 +6,7 @@
 
 use fmu_abi::clock::Event;
 use fmu_abi::{Refusal, Slave, Values, require_finite, resource, selected_mode};
-use ftc::control::{Compensate, Controller, ControllerState, Sample};
+use ftc::control::{Change, Compensate, Controller, ControllerState, Sample};
 use ftc::design::Design;
 use model_description::{CONTROLLER, Interface, Role, Span, VariableTable};
 use std::path::Path;
@@ -170,7 +170,10 @@ impl Slave for ControllerFmu {
             Some(Event::End(k)) => k + 1,
         };
         let sample = self.sample(values, k)?;
-        let change = seed.get(self.spans.measurement);
+        let change = Change {
+            measurement: seed.get(self.spans.measurement),
+            reference: seed.get(self.spans.reference),
+        };
         self.controller.differentiate(trial, &sample, change);
         self.publish(trial, response);
         Ok(())

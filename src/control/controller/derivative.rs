@@ -1,38 +1,53 @@
-//! How one tick's outputs follow a small change of its measurement.
+//! How one tick's outputs follow a small change of its measurement and reference.
 //!
 //! Between its decisions a tick is affine: with `D` the diagonal of flagged sensors,
 //!
 //! ```text
-//! dr = dy     df_hat = D dr     dy_c = dy - df_hat     dx_hat = H dy_c     du = K dx_hat
+//! dr = dy     df_hat = D dr     dy_c = dy - df_hat     dx_hat = H dy_c     du = K dx_hat + N dy_ref
 //! ```
 //!
 //! and a bumpless switch adds `G dZ`, the printed additive control `-K C^+ df_hat`. Flags, lost
-//! sensors and inputs at their limits do not move. The reference acts through the integrator,
-//! hence from the next tick on: this tick's outputs do not depend on it.
+//! sensors and inputs at their limits do not move. Through the integrators a reference acts from
+//! the next tick on: of this tick's outputs it moves the command alone, by the feedforward.
 
-use super::{Compensate, Controller, ControllerState, Sample};
+use super::{Compensate, Controller, ControllerState, Sample, readings};
 use crate::control::compensation::is_measurement;
 use crate::control::kernel;
 use crate::control::parameters::Compensation;
 
+/// A small change of what a tick is told.
+#[derive(Clone, Copy, Debug)]
+pub struct Change<'a> {
+    /// `dy` (p).
+    pub measurement: &'a [f64],
+    /// `dy_ref` (r).
+    pub reference: &'a [f64],
+}
+
 impl Controller {
     /// Runs a tick on `trial`, then turns its command, state estimate, residual and fault
-    /// estimate into their changes for a small change `dy` (p) of the sample's measurement.
+    /// estimate into their changes for a small change of the sample.
     ///
     /// What else is in `trial` means nothing afterwards: give a copy.
-    pub fn differentiate(&self, trial: &mut ControllerState, sample: &Sample<'_>, dy: &[f64]) {
+    pub fn differentiate(
+        &self,
+        trial: &mut ControllerState,
+        sample: &Sample<'_>,
+        change: Change<'_>,
+    ) {
+        let dy = change.measurement;
         let mode = sample.mode.min(self.modes.len().saturating_sub(1));
         let left = trial.mode.unwrap_or(mode);
         self.tick(trial, sample);
         let (estimator, observer) = (&self.parameters.estimator, &self.parameters.observer);
-        let y = sample.measurement;
-        trial.estimator.differentiate(estimator, mode, y, dy);
+        let screened = trial.repetition.screened();
+        trial.estimator.differentiate(estimator, mode, screened, dy);
         self.differentiate_correction(trial, sample, dy);
         let corrected = &trial.corrected;
         trial
             .observer
             .differentiate(observer, left, mode, corrected);
-        self.differentiate_command(trial, left, mode, sample.compensate);
+        self.differentiate_command(trial, left, mode, sample.compensate, change.reference);
     }
 
     /// `dy_c`, where the measurement is one.
@@ -44,7 +59,8 @@ impl Controller {
     ) {
         let subtracted = sample.compensate == Compensate::Estimate
             && self.parameters.compensation == Compensation::VirtualSensor;
-        let changes = trial.estimator.fault.iter().zip(sample.measurement).zip(dy);
+        let believed = readings(&trial.repetition, sample);
+        let changes = trial.estimator.fault.iter().zip(believed).zip(dy);
         for (corrected, ((&fault, &y), &dy)) in trial.corrected.iter_mut().zip(changes) {
             let change = if subtracted { dy - fault } else { dy };
             let seen = if is_measurement(y) { change } else { 0.0 };
@@ -59,6 +75,7 @@ impl Controller {
         left: usize,
         mode: usize,
         compensate: Compensate<'_>,
+        reference: &[f64],
     ) {
         let Some(gains) = self.parameters.feedback.modes.get(mode) else {
             return;
@@ -67,6 +84,7 @@ impl Controller {
         let change = &mut trial.acting;
         change.fill(0.0);
         kernel::add_product(change, &gains.state_feedback, estimate);
+        kernel::add_product(change, &gains.feedforward, reference);
         if left != mode && self.parameters.feedback.bumpless {
             // The integral part takes up what the estimate would have moved.
             trial.deviation.fill(0.0);

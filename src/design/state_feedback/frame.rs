@@ -121,6 +121,7 @@ impl Frame {
                 a: &self.inverse * &model.a * &self.basis,
                 b: &self.inverse * &model.b,
                 e: &self.inverse * &model.e / self.disturbance,
+                r: &self.inverse * &model.r,
                 h: &model.h * &self.basis / self.performance,
                 d: &model.d / self.performance,
             })

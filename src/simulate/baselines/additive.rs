@@ -19,6 +19,7 @@ pub fn additive(design: &Design) -> Result<ControllerParameters, DesignError> {
         objective: Objective::Decay,
         ..synthesis.state_feedback.spec.clone()
     };
+    let ours = &design.controller.feedback;
     let plant = &design.controller.plant;
     let control = state_feedback::synthesise(plant, &spec, &scaling(&design.signals))?;
     let mut parameters = design.controller.clone();
@@ -26,7 +27,8 @@ pub fn additive(design: &Design) -> Result<ControllerParameters, DesignError> {
     parameters.feedback = feedback(
         &control,
         plant,
-        design.controller.feedback.bumpless,
+        ours.bumpless,
+        ours.has_feedforward(),
         &parameters.input_limits,
     );
     Ok(parameters)

@@ -49,6 +49,8 @@ pub const INPUT_WEIGHT: f64 = 0.1;
 pub const INTERNAL_MODEL: bool = false;
 /// `controller.bumpless`
 pub const BUMPLESS: bool = false;
+/// `controller.feedforward`
+pub const FEEDFORWARD: bool = true;
 /// `observer.kind`
 pub const OBSERVER: ObserverKind = ObserverKind::Auto;
 /// `estimator.method`
@@ -59,6 +61,8 @@ pub const DATABASE: DatabaseSource = DatabaseSource::Commission;
 pub const SIGMAS: f64 = 6.0;
 /// `estimator.debounce`
 pub const DEBOUNCE: u32 = 1;
+/// `estimator.stuck_after`
+pub const STUCK_AFTER: u32 = 0;
 /// `estimator.adapt`
 pub const ADAPT: bool = false;
 /// `compensation.method`

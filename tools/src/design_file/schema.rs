@@ -151,6 +151,8 @@ pub struct Controller {
     pub input_weight: Option<NumberOrList>,
     /// No jump of the command at a mode switch.
     pub bumpless: Option<bool>,
+    /// The reference acts on the command at once.
+    pub feedforward: Option<bool>,
     /// Asymptotic rejection of the periodic disturbance.
     pub internal_model: Option<bool>,
 }
@@ -215,6 +217,8 @@ pub struct Estimator {
     pub sigmas: Option<f64>,
     /// Consecutive samples that raise or release a fault.
     pub debounce: Option<i64>,
+    /// Repetitions of one reading after which a sensor is taken for frozen.
+    pub stuck_after: Option<i64>,
     /// Whether the response goes on being learned while all is well.
     pub adapt: Option<bool>,
 }

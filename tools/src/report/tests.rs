@@ -67,6 +67,7 @@ fn lags(outputs: usize, disturbances: usize, steps: u64) -> Design {
     let gains = FeedbackGains {
         state_feedback: &square * -0.1,
         integral: &square * 0.2,
+        feedforward: DMatrix::zeros(outputs, 0),
         previous_input: DMatrix::zeros(outputs, 0),
         anti_windup: DMatrix::zeros(outputs, outputs),
         integral_inverse: &square * 5.0,
@@ -110,6 +111,7 @@ fn lags(outputs: usize, disturbances: usize, steps: u64) -> Design {
                 harmonic_transfers: vec![],
                 thresholds: vec![0.1; outputs],
                 debounce: 1,
+                stuck_after: 0,
                 leverage_limit: 100.0,
                 largest_fault: vec![1e6; outputs],
             },

@@ -57,6 +57,10 @@ pub fn facts(design: &Design) -> Vec<(String, String)> {
             ),
         ));
         facts.push(("Debounce", count(estimator.debounce as usize, "sample")));
+        if estimator.stuck_after > 0 {
+            let repetitions = count(estimator.stuck_after as usize, "repetition");
+            facts.push(("Frozen sensor", format!("after {repetitions} of a reading")));
+        }
     }
     if let Some(harmonics) = &estimator.harmonics {
         facts.push(("Periodic disturbance", periodic(harmonics, te)));
