@@ -69,3 +69,26 @@ fn cost_to_go(a: &DMatrix<f64>, h: &DMatrix<f64>) -> DMatrix<f64> {
     }
     sum
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    proptest! {
+        /// `P = H'H + A'PA` for every stable `A`, slow ones included.
+        #[test]
+        fn the_cost_solves_its_equation(
+            entries in prop::collection::vec(-1.0..1.0f64, 16),
+            weights in prop::collection::vec(-1.0..1.0f64, 8),
+            decay in 0.01..0.9999f64,
+        ) {
+            let raw = DMatrix::from_vec(4, 4, entries);
+            let a = &raw * (decay / raw.singular_values().max());
+            let h = DMatrix::from_vec(2, 4, weights);
+            let cost = cost_to_go(&a, &h);
+            let error = (h.transpose() * &h + a.transpose() * &cost * &a - &cost).amax();
+            prop_assert!(error <= 1e-12 * cost.amax(), "{error:e} of {:e}", cost.amax());
+        }
+    }
+}

@@ -106,6 +106,22 @@ class FaultFlag:
             self.up, self.against = faulty, 0
 
 
+class Repetition:
+    """Silences a sensor that has said the very same thing once too often."""
+
+    def __init__(self, design: dict) -> None:
+        """Remembers nothing yet."""
+        self.limit = design["controller"]["estimator"]["stuck_after"]
+        self.readings: list[np.ndarray] = []
+
+    def screen(self, y: np.ndarray) -> np.ndarray:
+        """Returns the readings, nan where the last `limit` were the same before."""
+        self.readings = [*self.readings[-self.limit :], y]
+        if self.limit == 0 or len(self.readings) <= self.limit:
+            return y
+        return np.where((np.array(self.readings) == y).all(axis=0), np.nan, y)
+
+
 class Estimator:
     """Sensor faults from the least-squares predictor of a healthy database, (55)-(60)."""
 
@@ -300,12 +316,15 @@ class Loop:
         ]
         return scenario.active_mode(plan["schedule"], tick, te), *values
 
-    def command(self, mode: int, x_hat: np.ndarray, Z: np.ndarray, u_old: np.ndarray) -> np.ndarray:
-        """Returns the command before saturation: u0 + K (x_hat - x0) + G Z + V (u_old - u0)."""
-        gains = self.design["controller"]["feedback"]["modes"][mode]
+    def command(self, mode: int, x_hat: np.ndarray, Z: np.ndarray, y_ref: np.ndarray, u_old: np.ndarray) -> np.ndarray:
+        """Returns the command before saturation: u0 + K (x_hat - x0) + G Z + N (y_ref - S y0) + V (u_old - u0)."""
+        feedback = self.design["controller"]["feedback"]
+        gains = feedback["modes"][mode]
         point = self.modes[mode]
-        K, G, V = (np.array(gains[key]) for key in ("state_feedback", "integral", "previous_input"))
+        K, G, N, V = (np.array(gains[key]) for key in ("state_feedback", "integral", "feedforward", "previous_input"))
         u = point.u0 + K @ (x_hat - point.x0) + G @ Z
+        if N.size:
+            u = u + N @ (y_ref - point.y0[feedback["tracked"]])
         return u + V @ (u_old - point.u0) if V.size else u
 
     def saturate(self, u: np.ndarray) -> np.ndarray:
@@ -327,6 +346,7 @@ class Loop:
         te = record.sample_time(self.design)
         feedback = self.design["controller"]["feedback"]
         estimator, observer = Estimator(self.design), Observer(self.design)
+        repetition = Repetition(self.design)
         mode = self.signals(0)[0]
         start = self.modes[mode]
         observer.start(mode)
@@ -344,15 +364,17 @@ class Loop:
 
             if mode != left:
                 estimator.enter(left, mode)
-            estimator.judge(tick, mode, y)
+            heard = repetition.screen(y)
+            estimator.judge(tick, mode, heard)
             substitute = estimator.y_hat if estimator.predicting else observer.predict(mode)
             fault = self.trusted_fault(variant, estimator.f_hat, sensors.fault)
-            y_c = np.where(np.isfinite(y), y - fault, substitute)
+            believed = heard if variant == "ftc" else y
+            y_c = np.where(np.isfinite(believed), believed - fault, substitute)
             observer.correct(mode, y_c)
             if mode != left and feedback["bumpless"]:
                 G = np.array(feedback["modes"][mode]["integral"])
-                Z = Z + np.linalg.pinv(G) @ (u - self.command(mode, observer.x_hat, Z, u))
-            wanted = self.command(mode, observer.x_hat, Z, u)
+                Z = Z + np.linalg.pinv(G) @ (u - self.command(mode, observer.x_hat, Z, y_ref, u))
+            wanted = self.command(mode, observer.x_hat, Z, y_ref, u)
             u_old, u = u, self.saturate(wanted)
             acting = u_old if feedback["latency"] else u
 

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 import pytest
+from scipy.linalg import solve_discrete_lyapunov
 
 import commands
 import design_file
@@ -33,7 +34,7 @@ class Finished:
         """The plant's modes."""
         return record.modes(self.record)
 
-    def loops(self) -> list[Augmented]:
+    def loops(self, weights: tuple[float, float, float] = WEIGHTS) -> list[Augmented]:
         """Returns the closed loop of each mode, with B and D zero, made from the shipped gains."""
         feedback = self.record["controller"]["feedback"]
         task = Task(
@@ -43,7 +44,7 @@ class Finished:
             feedback["latency"],
             self.report["lyapunov"],
             self.report["decay"],
-            WEIGHTS,
+            weights,
         )
         gains = [
             np.hstack([np.array(mode[key]) for key in ("state_feedback", "previous_input", "integral")])
@@ -114,6 +115,34 @@ def test_spectral_radius(finished: Finished) -> None:
     radii = [np.abs(np.linalg.eigvals(loop.A)).max() for loop in finished.loops()]
     assert max(radii) < finished.request["controller"]["decay"]
     np.testing.assert_allclose(finished.report["spectral_radius"], radii, rtol=1e-6)
+
+
+def _step_cost(loop: Augmented, move: np.ndarray, asked: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Returns P of the cost d' P d of a distance d from rest, and where a unit step of each reference comes to rest."""
+    P = solve_discrete_lyapunov(loop.A.T, loop.H.T @ loop.H)
+    return P, np.linalg.solve(np.eye(len(loop.A)) - loop.A, move + asked)
+
+
+def test_feedforward_costs_least(finished: Finished) -> None:
+    """No other feedforward N follows a step of the reference at less cost of tracking error and command."""
+    feedback = finished.record["controller"]["feedback"]
+    te, tracked = record.sample_time(finished.record), feedback["tracked"]
+    weights = (WEIGHTS[0], 0.0, WEIGHTS[2])
+    loops = zip(finished.modes, feedback["modes"], finished.loops(weights), strict=True)
+    for mode, gains, loop in loops:
+        n, r = len(mode.A), len(tracked)
+        N = np.array(gains["feedforward"])
+        B = np.vstack([mode.B, np.zeros((r, mode.B.shape[1]))])
+        R = np.vstack([np.zeros((n, r)), te * np.eye(r)])
+
+        def cost(N: np.ndarray, loop: Augmented = loop, B: np.ndarray = B, R: np.ndarray = R) -> float:
+            P, rest = _step_cost(loop, B @ N, R)
+            return float(np.trace(rest.T @ P @ rest))
+
+        least = cost(N)
+        rng = np.random.default_rng(1)
+        assert all(cost(N + 1e-3 * rng.standard_normal(N.shape)) > least for _ in range(50))
+        assert cost(0.0 * N) > 2.0 * least
 
 
 def test_attenuation_by_frequency_sweep(finished: Finished) -> None:

@@ -96,8 +96,19 @@ def resonant() -> dict:
     return design
 
 
+def frozen() -> dict:
+    """Returns a design that takes exact repetition for silence, and whose command follows (20) as printed."""
+    design = harsh()
+    design["name"] = "frozen"
+    design["controller"] |= {"feedforward": False}
+    design["estimator"] |= {"stuck_after": 3}
+    return design
+
+
 @pytest.mark.parametrize(
-    "design", [harsh(), displaced(), bumpless(), design_file.delayed(), resonant()], ids=lambda design: design["name"]
+    "design",
+    [harsh(), displaced(), bumpless(), design_file.delayed(), resonant(), frozen()],
+    ids=lambda design: design["name"],
 )
 def test_every_branch_of_the_on_line_path(make_case: Callable[[dict], Case], design: dict) -> None:
     """Saturation, lost and stuck sensors, harmonics, operating points, unequal sizes, bumpless switching, latency."""

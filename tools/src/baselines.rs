@@ -61,8 +61,7 @@ fn predictive(design: &Design, played: &Trajectory) -> Result<PredictiveSpec, St
     })
 }
 
-/// Per tracked output, the mean square error no causal controller beats on the scenario's
-/// reference: the output follows as many samples late as the plant and the latency need.
+/// Per tracked output, the deadbeat bound of the scenario's reference: the output follows as many samples late as the plant and the latency need.
 pub fn bound(design: &Design, played: &Trajectory) -> Vec<f64> {
     let feedback = &design.controller.feedback;
     let tracked = feedback.tracked.iter().enumerate();

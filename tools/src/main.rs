@@ -119,7 +119,7 @@ enum Command {
         out: PathBuf,
         /// Run two more: the paper's additive fault-tolerant control with gains that only decay
         /// (additive) and model predictive control without fault estimation (mpc); and give the
-        /// bound that no causal controller beats (deadbeat_bound).
+        /// error of a response as late as the plant needs and no later (deadbeat_bound).
         #[arg(long)]
         baselines: bool,
     },

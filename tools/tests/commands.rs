@@ -48,10 +48,10 @@ fn every_example_is_designed_and_simulated() {
         let metrics: Value =
             serde_json::from_slice(&fs::read(bench.path("out/metrics.json")).unwrap()).unwrap();
         let mse = |variant: &str| numbers(&metrics[variant]["mse"]["true"]);
-        // On a nonlinear plant an estimate carries what the linearisation misses; the thresholds
-        // of the example, 5 V and 0.6 A, are twice that.
+        // On a nonlinear plant an estimate carries what the linearisation misses, for which the
+        // example's thresholds of 5 V and 0.6 A leave room; its faults last half of the time.
         let nonlinear = path.ends_with("converter.toml");
-        let missed = if nonlinear { [2.5, 0.3] } else { [0.0; 2] };
+        let missed = if nonlinear { [5.0, 0.6] } else { [0.0; 2] };
         for (((ftc, without), told), missed) in mse("ftc")
             .iter()
             .zip(mse("no_ftc"))
@@ -59,7 +59,7 @@ fn every_example_is_designed_and_simulated() {
             .zip(missed)
         {
             assert!(
-                *ftc <= 1.05 * told + missed * missed,
+                *ftc <= 1.05 * told + 0.5 * missed * missed,
                 "{}: {ftc} against {told}",
                 path.display()
             );
@@ -382,7 +382,12 @@ fn the_objective_chooses_the_theorem() {
 fn baselines_are_written_beside_the_variants() {
     for latency in ["latency = 0", "latency = 1\nlyapunov = \"dwell\""] {
         let design = damaged("latency = 0\nlyapunov = \"common\"", latency)
-            .replace("decay = 0.7\noutput", "decay = 0.9\noutput");
+            .replace("decay = 0.7\noutput", "decay = 0.9\noutput")
+            // The bound is that of a plant that is left alone: what disturbs it may help by chance.
+            .replace("noise = 0.005", "noise = 0.0")
+            .replace("[28, 0.5]", "[28, 0.0]")
+            .replace("kind = \"stuck\"", "kind = \"bias\", size = 0.0")
+            .replace("amplitude = 0.04", "amplitude = 0.0");
         let bench = Bench::new(design);
         let run = bench.run(&["simulate", FILE, "--baselines", "--out", "out"]);
         assert_eq!(run.code(), 0, "{}", run.stderr());
@@ -397,12 +402,14 @@ fn baselines_are_written_beside_the_variants() {
         let bound = mse("deadbeat_bound");
         assert_eq!(bound.len(), 2);
         assert!(bound.iter().all(|&bound| bound > 0.0));
-        // Nobody follows faster than the plant can; the baselines are runs of their own.
+        // Nobody follows faster than the plant can. Between jumps 10 samples apart, an output that
+        // never quite arrives may save a tenth: min over e of (1 - e)^2 + 9 e^2 is 0.9.
         for key in ["ftc", "told_the_fault", "additive", "mpc"] {
             for (found, least) in mse(key).iter().zip(&bound) {
-                assert!(found >= least, "{key}: {found} below {least}");
+                assert!(*found >= 0.9 * least, "{key}: {found} below {least}");
             }
-            assert!(key == "ftc" || mse(key) != mse("ftc"), "{key}");
+            let baseline = key == "additive" || key == "mpc";
+            assert!(!baseline || mse(key) != mse("ftc"), "{key}");
         }
         let page = fs::read_to_string(bench.path("out/report.html")).unwrap();
         for name in ["additive FTC", "predictive control"] {

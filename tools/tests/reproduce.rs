@@ -92,7 +92,8 @@ fn the_papers_example_in_every_variant() {
     for row in sine.filter(|row| row["noise"] == "0.0") {
         assert!(number(row, "true_vaf") >= 99.7, "{row:?}");
     }
-    for run in runs {
+    // The sine can be run ahead of; what jumps cannot.
+    for run in runs.iter().filter(|run| run["reference"] != "sine") {
         let error: f64 = run["outputs"]
             .as_array()
             .unwrap()
@@ -165,10 +166,12 @@ fn the_converter_under_every_fault() {
         for (letter, output) in sensors {
             let fault = format!("{letter}_{kind}");
             let rivals = ["ftc", "mpc"].map(|controller| find(&fault, controller, output));
-            // A current sensor that is silent cannot lie, and the current's model is exact: MPC
-            // then loses nothing, and keeps what it is ahead without fault.
+            // A current sensor that is silent cannot lie, and the current's model is exact: both
+            // reach the deadbeat bound, and differ by less than the noise, 0.05 A, is worth beside
+            // a reference of 8 A.
             let silent = fault == "i_dropout";
-            let handicap = if silent { 1.0 } else { 0.0 };
+            let noise_worth = 100.0 * (0.05_f64 / 8.0).powi(2);
+            let handicap = if silent { noise_worth } else { 0.0 };
             assert!(
                 rivals[0] > rivals[1] - handicap,
                 "{fault}: {} against {}",

@@ -1,4 +1,6 @@
-//! The bound no causal controller beats when the plant needs a sample to answer.
+//! What following a reference costs at least, when the plant needs a sample to answer: the bound of
+//! every causal controller whose output rests on the reference whenever that jumps. A smooth
+//! reference can be run ahead of, and what disturbs the output may happen to help.
 
 use crate::plant::{Mode, SwitchedPlant};
 

@@ -24,7 +24,8 @@ pub struct Reference {
     pub name: &'static str,
     /// Its variance.
     pub variance: f64,
-    /// The response one sample late: no causal controller has a smaller mean square error.
+    /// The response one sample late: where the reference jumps, no causal controller has a smaller
+    /// mean square error.
     pub deadbeat: Merit,
     /// The controller told the fault.
     pub told: Merit,
