@@ -188,7 +188,7 @@ mod tests {
 
     #[test]
     fn a_wrong_database_is_corrected() {
-        let (fixed, adapted) = adapt(&[1.1, 0.45], &predictor(&[1.0, 0.5], 10.0), 4000);
+        let (fixed, adapted) = adapt(&[1.02, 0.49], &predictor(&[1.0, 0.5], 10.0), 4000);
         assert!(
             adapted.abs() < 0.02 * fixed.abs(),
             "{adapted} against {fixed}"
@@ -199,5 +199,19 @@ mod tests {
     fn a_response_that_strays_is_not_believed() {
         let (fixed, adapted) = adapt(&[-3.0, 0.5], &predictor(&[1.0, 0.5], 10.0), 4000);
         assert!(adapted.abs() <= fixed.abs() + 1e-12);
+    }
+
+    /// A fault that grows slowly enough to stay unseen was once followed to any size.
+    #[test]
+    fn a_fault_that_grows_unseen_is_not_followed() {
+        let known = predictor(&[1.0, 0.5], 10.0);
+        let mut adaptation = Adaptation::new(&known);
+        for k in 0..4000 {
+            let phi = [1.0, 0.2];
+            adaptation.predict(&known, &phi, &[0.0], &[1.1]);
+            adaptation.learn(&phi, &[1e-3 * f64::from(k)]);
+            let added: f64 = adaptation.additions().sum();
+            assert!(added <= BELIEVABLE * 1.1 + SIGMAS * 0.01, "{added} at {k}");
+        }
     }
 }
