@@ -222,6 +222,9 @@ impl EstimatorState {
     /// Adds what adaptation learned to prediction and residual, and to the estimate of every declared
     /// fault that was judged anew; the flags stay.
     fn refine(&mut self, estimator: &Estimator, seen: &Observation<'_>) {
+        if estimator.method != EstimatorMethod::Reference {
+            return;
+        }
         let Some(adaptation) = self.adaptations.get(seen.mode) else {
             return;
         };
