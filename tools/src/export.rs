@@ -2,11 +2,11 @@
 
 use crate::archive::{self, Contents};
 use crate::certificate::{self, Certificate};
+use crate::documentation;
 use crate::output::Staging;
-use crate::report::page::{Block, Page, Section};
 use crate::ssp::{self, Component, System};
-use crate::summary;
 use ftc::design::Design;
+use ftc::simulate::Trajectory;
 use model_description::xml::{self, Document};
 use model_description::{CONTROLLER, Interface, PLANT, VariableTable};
 use std::fmt::Write as _;
@@ -85,6 +85,8 @@ struct Exporter<'a> {
     /// The proof, as `verify` reads it.
     certificate: Vec<u8>,
     interface: Interface,
+    /// The experiment, for the documentation's figures.
+    runs: Vec<Trajectory>,
     binaries: Vec<Binaries>,
 }
 
@@ -102,6 +104,7 @@ pub fn write(design: &Design, staging: Staging, ssp: bool) -> Result<String, Str
             .map_err(|error| error.to_string())?,
         resource,
         interface: Interface::from(design),
+        runs: documentation::runs(design),
         binaries: Binaries::find()?,
     };
     let mut fmus = Contents::new();
@@ -144,7 +147,7 @@ impl Exporter<'_> {
             (certificate::PATH.into(), self.certificate.clone()),
             (
                 "documentation/index.html".into(),
-                documentation(self.design, kind).into_bytes(),
+                self.document(kind).into_bytes(),
             ),
             ("documentation/licenses/license.txt".into(), LICENSES.into()),
         ]);
@@ -156,6 +159,12 @@ impl Exporter<'_> {
             );
         }
         archive::zip(&identifier, &contents)
+    }
+
+    fn document(&self, kind: &Kind) -> String {
+        let title = format!("{}: {}", self.design.name, kind.suffix);
+        let lead = format!("{}.", kind.description);
+        documentation::page(self.design, &self.runs, title, lead)
     }
 
     fn describe(&self, kind: &Kind, identifier: &str) -> Result<String, String> {
@@ -312,21 +321,4 @@ fn host_library(binary: &str) -> String {
         std::env::consts::DLL_PREFIX,
         std::env::consts::DLL_SUFFIX
     )
-}
-
-/// A page with the design report.
-fn documentation(design: &Design, kind: &Kind) -> String {
-    let section = |(title, lines): summary::Section| Section::new(title).with(Block::Facts(lines));
-    Page {
-        title: format!("{}: {}", design.name, kind.suffix),
-        lead: format!("{}.", kind.description),
-        sections: summary::sections(design).into_iter().map(section).collect(),
-        footer: format!(
-            "Made by ftc-fmu {} from the design “{}”.",
-            env!("CARGO_PKG_VERSION"),
-            design.name
-        ),
-        ..Page::default()
-    }
-    .render()
 }
