@@ -6,7 +6,7 @@ mod adapting;
 mod random_plants;
 
 use adapting::{
-    STEPS, bears, change_gains, changed_plant, play, ratio, scale_thresholds, with_faults,
+    STEPS, bears, change_gains, changed_plant, errors, play, ratio, scale_thresholds, with_faults,
 };
 use ftc::simulate::Variant;
 use random_plants::{Dice, design};
@@ -65,4 +65,16 @@ fn a_plant_that_changed_is_predicted_better() {
     println!("adapted over fixed residual: {gains:.3?}");
     assert!(gains.iter().all(|&gain| gain < 0.9));
     assert!(gains[gains.len() / 2] < 0.5);
+}
+
+/// Inputs hundreds of times those of the database, a predictor that noise made imprecise, and a
+/// sensor accused: following the residual closed the loop over that predictor, and it diverged.
+#[test]
+fn an_imprecise_predictor_closes_no_loop() {
+    let mut dice = Dice::seeded(32);
+    let plants = std::iter::repeat_with(|| changed_plant(&mut dice, 0.97, 2.0));
+    for design in plants.flatten().take(6) {
+        let [_, fixed] = errors(&design);
+        assert!(fixed.is_some(), "an output is lost");
+    }
 }

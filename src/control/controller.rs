@@ -202,16 +202,16 @@ impl Controller {
         model: &ObservedMode,
         sample: &Sample<'_>,
     ) {
-        if state.estimator.can_predict(&self.parameters.estimator) {
-            kernel::copy(&mut state.substitute, &state.estimator.prediction);
-        } else {
-            state.observer.expected_output(model, &mut state.substitute);
-        }
+        let settings = &self.parameters.estimator;
+        state.observer.expected_output(model, &mut state.substitute);
+        state
+            .estimator
+            .predict_into(settings, &mut state.substitute);
+        let estimated = sample.compensate == Compensate::Estimate
+            && self.parameters.compensation == Compensation::VirtualSensor;
         let fault = match sample.compensate {
             Compensate::Known(fault) => fault,
-            Compensate::Estimate if self.parameters.compensation == Compensation::VirtualSensor => {
-                &state.estimator.fault
-            }
+            Compensate::Estimate if estimated => &state.estimator.fault,
             Compensate::Estimate | Compensate::Nothing => &state.no_fault,
         };
         compensation::correct(
@@ -220,14 +220,10 @@ impl Controller {
             fault,
             &state.substitute,
         );
-        if sample.compensate == Compensate::Estimate
-            && state.estimator.holds(&self.parameters.estimator)
-        {
-            let accused = &state.estimator.flagged;
+        if estimated {
+            let held = state.estimator.held(settings);
             let (thresholds, corrected) = (sample.thresholds, &mut state.corrected);
-            state
-                .open_loop
-                .overrule(model, accused, thresholds, corrected);
+            state.open_loop.overrule(model, held, thresholds, corrected);
         }
         kernel::bound(&mut state.corrected);
     }
@@ -330,7 +326,9 @@ impl Controller {
                 .observer
                 .predict(&gain.0, model, &state.acting, &state.corrected);
         }
-        if state.estimator.holds(&self.parameters.estimator) {
+        let settings = &self.parameters.estimator;
+        let holding = state.estimator.held(settings).any(|held| held);
+        if holding {
             state.open_loop.advance(model, &state.acting);
         } else {
             state.open_loop.restart(state.observer.predicted());

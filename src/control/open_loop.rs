@@ -1,9 +1,10 @@
-//! What the model alone says since the last mode switch, and whom it contradicts.
+//! What the model alone says since residuals lost their meaning, and whom it contradicts.
 //!
-//! While the regressor mixes modes no residual means anything, and an accused sensor is corrected by
-//! the last estimate of its fault. That is right for a bias. A sensor that is stuck, or whose fault
-//! comes or goes just then, would leave the loop without feedback: where the corrected reading and
-//! the model run from the switch on drift far apart, the model is believed.
+//! While the regressor mixes modes, or lies beyond what the database spans, no residual means
+//! anything, and an accused sensor is corrected by the last estimate of its fault. That is right for
+//! a bias. A sensor that is stuck, or whose fault comes or goes just then, would leave the loop
+//! without feedback: where the corrected reading and the model's run since then drift far apart, the
+//! model is believed.
 
 use super::kernel;
 use super::observer::ObservedMode;
@@ -16,7 +17,7 @@ const TOLERANCE: f64 = 4.0;
 /// The model's run, and the sensors it contradicts.
 #[derive(Debug, PartialEq, Serialize, Deserialize)]
 pub struct OpenLoop {
-    /// State predicted without any measurement since the switch (n).
+    /// State predicted without any measurement since then (n).
     state: Vec<f64>,
     /// The next state, while it is computed (n).
     next: Vec<f64>,
@@ -57,21 +58,20 @@ impl OpenLoop {
         kernel::copy(&mut self.state, &self.next);
     }
 
-    /// Replaces the `corrected` readings (p) of accused sensors that differ from the model's by more
-    /// than their `thresholds` (p) allow.
+    /// Replaces the `corrected` readings (p) of sensors whose estimate is `held` (p) and that differ
+    /// from the model's by more than their `thresholds` (p) allow.
     pub fn overrule(
         &mut self,
         mode: &ObservedMode,
-        accused: &[bool],
+        held: impl Iterator<Item = bool>,
         thresholds: &[f64],
         corrected: &mut [f64],
     ) {
         kernel::affine(&mut self.output, &mode.output_offset, &mode.c, &self.state);
-        let sensors = accused.iter().zip(thresholds).zip(&self.output);
+        let sensors = held.zip(thresholds).zip(&self.output);
         let readings = corrected.iter_mut().zip(&mut self.contradicted);
-        for ((reading, contradicted), ((&accused, &threshold), &expected)) in readings.zip(sensors)
-        {
-            *contradicted = accused && (*reading - expected).abs() > TOLERANCE * threshold;
+        for ((reading, contradicted), ((held, &threshold), &expected)) in readings.zip(sensors) {
+            *contradicted = held && (*reading - expected).abs() > TOLERANCE * threshold;
             if *contradicted {
                 *reading = expected;
             }

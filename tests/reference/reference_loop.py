@@ -157,12 +157,7 @@ class Estimator:
         self.y_hat = np.zeros(self.outputs)
         self.residual = np.zeros(self.outputs)
         self.f_hat = np.zeros(self.outputs)
-        self.judging = False
-
-    @property
-    def predicting(self) -> bool:
-        """Whether the prediction may stand in for a lost sensor."""
-        return self.enabled and self.judging
+        self.judged = np.zeros(self.outputs, dtype=bool)
 
     def _wave(self, tick: int) -> np.ndarray:
         harmonics = self.settings["harmonics"]
@@ -198,9 +193,11 @@ class Estimator:
             spread += self.fits[mode].leverage(h)
         self.residual = np.where(present, y - self.y_hat, self.residual)
         limit = self.settings["leverage_limit"]
-        self.judging = self.hold == 0
+        deviation = np.array(self.settings["predictors"][mode]["deviation"])
+        precise = math.sqrt(distance) * deviation <= 0.01 * np.abs(self.y_hat - self.modes[mode].y0)
+        self.judged = (self.hold == 0) & (precise | (distance <= limit))
         trust = Trust(math.sqrt(spread), clears=spread <= 1.0 + limit, teaches=distance <= limit)
-        healthy = self._decide(present, trust=trust if self.judging else None)
+        healthy = self._decide(present, trust=trust)
         if self.fits:
             corrected = self._reconsider(mode, h, y - undisturbed)
             if healthy and not corrected:
@@ -228,9 +225,9 @@ class Estimator:
 
     def _decide(self, present: np.ndarray, *, trust: Trust | None) -> bool:
         """Votes on each sensor's flag and sets f_hat; says whether every sensor was judged and found healthy."""
-        all_well = trust is not None and trust.teaches and bool(present.all())
+        all_well = trust is not None and trust.teaches and bool(present.all() and self.judged.all())
         for i, flag in enumerate(self.flags):
-            if present[i] and trust is None:
+            if present[i] and not self.judged[i]:
                 continue
             threshold = self.settings["thresholds"][i]
             factor = trust.factor(accused=flag.up) if trust else 1.0
@@ -384,15 +381,15 @@ class Loop:
                 estimator.enter(left, mode)
             heard = repetition.screen(y)
             estimator.judge(tick, mode, heard)
-            substitute = estimator.y_hat if estimator.predicting else observer.predict(mode)
+            substitute = np.where(estimator.judged, estimator.y_hat, observer.predict(mode))
             fault = self.trusted_fault(variant, estimator.f_hat, sensors.fault)
             believed = heard if variant == "ftc" else y
             y_c = np.where(np.isfinite(believed), believed - fault, substitute)
-            holding = estimator.enabled and not estimator.predicting
-            if variant == "ftc" and holding:
+            held = estimator.enabled & np.array([flag.up for flag in estimator.flags]) & ~estimator.judged
+            if variant == "ftc" and self.design["controller"]["compensation"] == "virtual-sensor":
                 modelled = self.modes[mode].C @ model_run + self.modes[mode].c
                 far = np.abs(y_c - modelled) > 4.0 * np.array(estimator.settings["thresholds"])
-                y_c = np.where([flag.up for flag in estimator.flags] & far, modelled, y_c)
+                y_c = np.where(held & far, modelled, y_c)
             observer.correct(mode, y_c)
             if mode != left and feedback["bumpless"]:
                 G = np.array(feedback["modes"][mode]["integral"])
@@ -405,7 +402,7 @@ class Loop:
             Z = internal.M @ Z + internal.N @ (te * (y_ref - y_c[feedback["tracked"]])) + unwinding @ (u - wanted)
             observer.advance(mode, acting, y_c)
             here = self.modes[mode]
-            model_run = here.A @ model_run + here.B @ acting + here.a if holding else observer.prior
+            model_run = here.A @ model_run + here.B @ acting + here.a if held.any() else observer.prior
             estimator.past.append(acting)
             for name, value in {
                 "mode": [mode + 1],

@@ -18,9 +18,9 @@ impl EstimatorState {
     ) {
         let slope = self.residual_slope(estimator, mode);
         let residuals = self.residual.iter_mut().zip(&mut self.fault);
-        let judged = self.judged;
-        let limits = self.flagged.iter().zip(&estimator.largest_fault);
-        for (((residual, fault), (&flagged, &largest)), (&y, &dy)) in
+        let decided = self.flagged.iter().zip(&self.judged);
+        let limits = decided.zip(&estimator.largest_fault);
+        for (((residual, fault), ((&flagged, &judged), &largest)), (&y, &dy)) in
             residuals.zip(limits).zip(y.iter().zip(dy))
         {
             let follows = judged && flagged && residual.abs() < largest;

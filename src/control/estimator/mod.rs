@@ -65,6 +65,10 @@ impl Trust {
     }
 }
 
+/// Where the input lies beyond what the database spans, a prediction is trusted all the same if its
+/// deviation is below this share of what it predicts. A loop closed over a less precise one may diverge.
+const PRECISE: f64 = 0.01;
+
 /// One sample as the estimator sees it.
 #[derive(Clone, Copy, Debug)]
 pub struct Observation<'a> {
@@ -88,8 +92,8 @@ pub struct EstimatorState {
     history: InputHistory,
     /// Ticks until the regressor again holds inputs of the present mode only.
     hold: usize,
-    /// Whether the last residual was judged.
-    judged: bool,
+    /// Whether the last residual could be judged, per sensor (p).
+    judged: Vec<bool>,
     /// Per mode: the learned response to the periodic disturbance.
     harmonics: Vec<HarmonicState>,
     /// Watches accused sensors for a wrongly learned disturbance.
@@ -117,13 +121,14 @@ crate::state::state!(EstimatorState {
         adaptations,
         decisions,
         window,
+        judged,
         prediction,
         residual,
         fault,
         flagged
     ],
     constants: [],
-    counters: [hold, judged]
+    counters: [hold]
 });
 
 impl EstimatorState {
@@ -141,7 +146,7 @@ impl EstimatorState {
         Self {
             history: InputHistory::new(inputs, estimator.response_length),
             hold: estimator.response_length,
-            judged: false,
+            judged: vec![false; outputs],
             harmonics,
             recovery: estimator
                 .harmonics
@@ -196,14 +201,24 @@ impl EstimatorState {
         }
     }
 
-    /// Whether the prediction can be used in place of a measurement now.
-    pub fn can_predict(&self, estimator: &Estimator) -> bool {
-        estimator.method == EstimatorMethod::Reference && self.judged
+    /// Puts the prediction in place of `expected` outputs (p), where it can be trusted now.
+    pub fn predict_into(&self, estimator: &Estimator, expected: &mut [f64]) {
+        if estimator.method != EstimatorMethod::Reference {
+            return;
+        }
+        let known = self.prediction.iter().zip(&self.judged);
+        for (output, (&predicted, &judged)) in expected.iter_mut().zip(known) {
+            if judged {
+                *output = predicted;
+            }
+        }
     }
 
-    /// Whether the last sample could not be judged, so that estimates stand still.
-    pub fn holds(&self, estimator: &Estimator) -> bool {
-        estimator.method == EstimatorMethod::Reference && !self.judged
+    /// Which sensors (p) are accused and could not be judged anew, so that their estimate stands still.
+    pub fn held<'a>(&'a self, estimator: &Estimator) -> impl Iterator<Item = bool> + Clone + 'a {
+        let reference = estimator.method == EstimatorMethod::Reference;
+        let sensors = self.flagged.iter().zip(&self.judged);
+        sensors.map(move |(&flagged, &judged)| reference && flagged && !judged)
     }
 
     /// Judges one sample, sensor by sensor.
@@ -214,7 +229,6 @@ impl EstimatorState {
             EstimatorMethod::Sliding => self.slide(seen),
             EstimatorMethod::None => None,
         };
-        self.judged = trust.is_some();
         let healthy = self.decide(estimator, seen, trust);
         let corrected = self.reconsider(estimator, seen);
         if healthy && !corrected {
@@ -233,20 +247,23 @@ impl EstimatorState {
         let Some(adaptation) = self.adaptations.get(seen.mode) else {
             return;
         };
-        let estimates = self.fault.iter_mut().zip(&self.flagged);
+        let decided = self.flagged.iter().zip(&self.judged);
+        let estimates = self.fault.iter_mut().zip(decided);
         let signals = self.prediction.iter_mut().zip(&mut self.residual);
         let limits = seen.y.iter().zip(&estimator.largest_fault);
-        for (((addition, (prediction, residual)), (fault, &flagged)), (&value, &largest)) in
-            adaptation
-                .additions()
-                .zip(signals)
-                .zip(estimates)
-                .zip(limits)
+        for (
+            ((addition, (prediction, residual)), (fault, (&flagged, &judged))),
+            (&value, &largest),
+        ) in adaptation
+            .additions()
+            .zip(signals)
+            .zip(estimates)
+            .zip(limits)
         {
             *prediction = kernel::bounded(*prediction + addition);
             if is_measurement(value) {
                 *residual = value - *prediction;
-                if flagged && self.judged {
+                if flagged && judged {
                     *fault = residual.clamp(-largest, largest);
                 }
             }
@@ -256,6 +273,7 @@ impl EstimatorState {
     /// The reference window: leaves prediction and residual, and returns how far to trust them;
     /// nothing while the regressor mixes modes.
     fn predict(&mut self, estimator: &Estimator, seen: &Observation<'_>) -> Option<Trust> {
+        self.judged.fill(false);
         let predictor = estimator.predictors.get(seen.mode)?;
         kernel::affine(
             &mut self.prediction,
@@ -283,11 +301,21 @@ impl EstimatorState {
                 *residual = value - predicted;
             }
         }
+        let spanned = leverage <= estimator.leverage_limit;
+        let signals = self
+            .prediction
+            .iter()
+            .zip(seen.y0)
+            .zip(&predictor.deviation);
+        for (judged, ((&predicted, &y0), deviation)) in self.judged.iter_mut().zip(signals) {
+            let precise = libm::sqrt(leverage) * deviation <= PRECISE * (predicted - y0).abs();
+            *judged = self.hold == 0 && (spanned || precise);
+        }
         let most = 1.0 + estimator.leverage_limit;
         let trust = Trust {
             widening: libm::sqrt(spread),
             clears: spread <= most,
-            teaches: leverage <= estimator.leverage_limit,
+            teaches: spanned,
         };
         (self.hold == 0).then_some(trust)
     }
@@ -343,8 +371,10 @@ impl EstimatorState {
 
     /// The sliding window as printed: leaves the residual; nothing until the window is full.
     fn slide(&mut self, seen: &Observation<'_>) -> Option<Trust> {
+        self.judged.fill(false);
         let window = self.window.as_mut().filter(|_| self.hold == 0)?;
         window.residual(self.history.regressor(), seen.y, &mut self.residual);
+        self.judged.fill(window.full());
         window.full().then_some(Trust::FULL)
     }
 
@@ -366,15 +396,15 @@ impl EstimatorState {
             .decisions
             .iter_mut()
             .zip(&mut self.fault)
-            .zip(&mut self.flagged);
+            .zip(self.flagged.iter_mut().zip(&self.judged));
         let signals = seen
             .y
             .iter()
             .zip(&self.residual)
             .zip(seen.thresholds.iter().zip(&estimator.largest_fault));
-        for (((decision, fault), flagged), ((&value, &residual), (&threshold, &largest))) in
-            sensors.zip(signals)
-        {
+        for (((decision, fault), (flagged, &judged)), signals) in sensors.zip(signals) {
+            let ((&value, &residual), (&threshold, &largest)) = signals;
+            let trust = trust.filter(|_| judged);
             let verdict = if !is_measurement(value) {
                 Some(Verdict::Lost)
             } else {
