@@ -183,7 +183,7 @@ const LARGEST_RESIDUAL: f64 = 1e-5;
 
 /// The ways to solve, in the order they are tried. One thread, so that the same problem gives the
 /// same bits; tight tolerances, since strict inequalities live from the last digits.
-fn settings() -> [DefaultSettings<f64>; 3] {
+fn settings() -> [DefaultSettings<f64>; 4] {
     let usual = DefaultSettings {
         verbose: false,
         direct_solve_method: "faer".into(),
@@ -198,11 +198,15 @@ fn settings() -> [DefaultSettings<f64>; 3] {
         direct_solve_method: "qdldl".into(),
         ..usual.clone()
     };
-    let unequilibrated = DefaultSettings {
-        equilibrate_enable: false,
+    let undecomposed = DefaultSettings {
+        chordal_decomposition_enable: false,
         ..other_factorisation.clone()
     };
-    [usual, other_factorisation, unequilibrated]
+    let unequilibrated = DefaultSettings {
+        equilibrate_enable: false,
+        ..undecomposed.clone()
+    };
+    [usual, other_factorisation, undecomposed, unequilibrated]
 }
 
 /// What a status without a candidate means to the user.

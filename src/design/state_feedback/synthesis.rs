@@ -32,7 +32,7 @@ const THICK_MARGIN: f64 = 1e-2;
 /// How often better coordinates are sought.
 const REFRAMINGS: usize = 12;
 
-/// A least level that better coordinates lower by less than this, relatively, is the least.
+/// A least level that better coordinates change by less than this, relatively, is the least.
 const AGREEMENT: f64 = 1e-5;
 
 /// Designs the state feedback that is asked for and proves it.
@@ -105,19 +105,20 @@ fn stable(
     spec: &ControlSpec,
     group: &[usize],
 ) -> Result<(Margin, Option<Vec<Part>>), SolverFailure> {
-    let (margin, parts) = theorem::stabilise(models, spec, group)?;
-    if margin.margin >= SURE_MARGIN {
-        return Ok((margin, Some(parts)));
-    }
+    let plain = match theorem::stabilise(models, spec, group) {
+        Ok((margin, parts)) if margin.margin >= SURE_MARGIN => return Ok((margin, Some(parts))),
+        uncertain => uncertain,
+    };
     let regulated = Frame::of_regulated(models, group, spec.decay).and_then(|frame| {
         let (margin, parts) = theorem::stabilise(&frame.view(models), spec, group).ok()?;
         (margin.margin >= SURE_MARGIN).then(|| (margin, frame.restore(parts)))
     });
-    Ok(match regulated {
-        Some((margin, parts)) => (margin, Some(parts)),
-        None if margin.margin >= SMALLEST_MARGIN => (margin, Some(parts)),
-        None => (margin, None),
-    })
+    if let Some((margin, parts)) = regulated {
+        return Ok((margin, Some(parts)));
+    }
+    let (margin, parts) = plain?;
+    let shown = margin.margin >= SMALLEST_MARGIN;
+    Ok((margin, shown.then_some(parts)))
 }
 
 /// The gains solved for again in the coordinates they suggest, as long as the margin is thin and
@@ -185,8 +186,7 @@ impl Road<'_> {
     }
 
     /// The least `g` of a group, and coordinates in which (T2) is at ease near it: each solution's
-    /// coordinates serve the next, which looks at Lyapunov matrices further away, until that gains
-    /// nothing.
+    /// coordinates serve the next, which looks at Lyapunov matrices further away, until both agree.
     fn least_level(&self, group: &[usize], start: &[Part]) -> Result<Optimum, SolverFailure> {
         let models = &self.models;
         let (size, inputs) = models[0].b.shape();
@@ -200,8 +200,8 @@ impl Road<'_> {
                 break;
             };
             let level = frame.restore_level(found.level.max(floor));
-            if least.is_some_and(|least| level > (1.0 - AGREEMENT) * least) {
-                bound = frame.restore_level(found.bound.max(0.0));
+            if least.is_some_and(|least| (level / least - 1.0).abs() < AGREEMENT) {
+                (least, bound) = (Some(level), frame.restore_level(found.bound.max(0.0)));
                 break;
             }
             let parts = frame.restore(found.parts);
@@ -227,25 +227,30 @@ impl Road<'_> {
         }
         let mut outcome = Err(DesignError::Solver(SolverFailure::NumericalTrouble));
         for sacrifice in SACRIFICES {
-            let mut levels = Levels::new(self);
-            let mut parts = Vec::new();
-            for (group, least) in groups.iter().zip(&least) {
-                let relaxed = levels.set(group, least, sacrifice);
-                let frame = &least.frame;
-                let view = frame.view(&self.models);
-                match theorem::centred(&view, self.spec, group, frame.view_level(relaxed)) {
-                    Ok(found) => parts.extend(frame.restore(found)),
-                    Err(failure) => outcome = Err(failure.into()),
-                }
-            }
-            if parts.len() == self.models.len() {
-                outcome = self.certified(parts, Some(levels));
-            }
+            outcome = self.centred(&groups, &least, sacrifice);
             if outcome.is_ok() {
                 break;
             }
         }
         outcome
+    }
+
+    /// Gains of largest margin at the least levels but for a `sacrifice`, certified.
+    fn centred(
+        &self,
+        groups: &[Vec<usize>],
+        least: &[Optimum],
+        sacrifice: f64,
+    ) -> Result<StateFeedback, DesignError> {
+        let mut levels = Levels::new(self);
+        let mut parts = Vec::new();
+        for (group, least) in groups.iter().zip(least) {
+            let (frame, level) = (&least.frame, levels.set(group, least, sacrifice));
+            let view = frame.view(&self.models);
+            let found = theorem::centred(&view, self.spec, group, frame.view_level(level))?;
+            parts.extend(frame.restore(found));
+        }
+        self.certified(parts, Some(levels))
     }
 
     /// Puts the parts together in physical units, and proves the whole.

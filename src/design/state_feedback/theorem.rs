@@ -192,8 +192,8 @@ pub(super) fn stabilise(
 }
 
 /// How far, as a factor, Lyapunov matrices may be from the identity in one solution of
-/// [`least_level`].
-const REACH: f64 = 1e2;
+/// [`least_level`], tried in turn.
+const REACHES: [f64; 3] = [1e2, 1e4, 1e6];
 
 /// What of `g` (about 1) may be lost to keep Lyapunov matrices near the identity where they are free.
 const NEARNESS: f64 = 1e-6;
@@ -209,9 +209,24 @@ pub(super) struct LeastLevel {
 }
 
 /// The least `g >= floor` of a group (T2), as the solver sees it, with the gains that come with it,
-/// among Lyapunov matrices within [`REACH`] of the identity. Without that limit the least `g` need
-/// not be attained: what the disturbance does not reach lets Lyapunov matrices grow or vanish for ever.
+/// among Lyapunov matrices within reach of the identity. Without that limit the least `g` need not
+/// be attained: what the disturbance does not reach lets Lyapunov matrices grow or vanish for ever.
 pub(super) fn least_level(
+    models: &[AugmentedMode],
+    spec: &ControlSpec,
+    group: &[usize],
+    floor: f64,
+) -> Result<LeastLevel, SolverFailure> {
+    let within = |reach| least_level_within(reach, models, spec, group, floor);
+    let farther = REACHES[1..].iter().copied();
+    farther.fold(within(REACHES[0]), |found, reach| {
+        found.or_else(|_| within(reach))
+    })
+}
+
+/// [`least_level`] with one reach.
+fn least_level_within(
+    reach: f64,
     models: &[AugmentedMode],
     spec: &ControlSpec,
     group: &[usize],
@@ -231,10 +246,10 @@ pub(super) fn least_level(
     );
     require_decay(&mut problem, models, spec, group, &unknowns);
     problem.require_at_least(&level, floor);
-    problem.require_at_least(&least, 1.0 / REACH);
+    problem.require_at_least(&least, 1.0 / reach);
     let (matrices, total) = matrices(spec.lyapunov, &unknowns, models);
-    problem.require_trace_below(&matrices, REACH * total);
-    let spread = (1.0 / (REACH * total)) * trace(&matrices) - least.expression();
+    problem.require_trace_below(&matrices, reach * total);
+    let spread = (1.0 / (reach * total)) * trace(&matrices) - least.expression();
     for (matrix, &mode) in matrices.into_iter().zip(group) {
         let name = BlockName::new(BlockKind::Lyapunov, mode, mode);
         let above = matrix - least.times_identity(models[0].a.nrows());
