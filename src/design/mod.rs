@@ -39,6 +39,7 @@ pub use state_feedback::{ModeGains, StateFeedback};
 pub use units::Units;
 pub use verdict::{
     Advice, BlockKind, BlockName, ConflictingBlock, DesignError, Infeasibility, SolverFailure,
+    Uncertified,
 };
 
 /// A certified state feedback and a certified observer for one plant.

@@ -48,7 +48,8 @@ pub struct StateFeedback {
     /// is active (one number per mode, equal under `common` and `switched`); absent when only
     /// decay was asked for or the plant knows no disturbance.
     pub gamma: Option<Vec<f64>>,
-    /// The solver's own optimum of `gamma`, for comparison; not proved.
+    /// Below this, per mode, no gains reach under the same guarantee, as far as the solver can tell
+    /// (its dual bound, not proved); zero where it cannot tell.
     pub optimum: Option<Vec<f64>>,
     /// Spectral radius of each mode's closed loop (floating point; the certificate proves the
     /// decay).
@@ -59,7 +60,23 @@ pub struct StateFeedback {
     pub certificate: ControlCertificate,
 }
 
+/// A `gamma` below this, in the certificate's units (in which disturbance and performance signal are
+/// near one), counts as complete rejection: nothing smaller is sought.
+pub const REJECTION: f64 = 1e-4;
+
+/// How far above its optimum, relatively, a `gamma` may lie and be called the optimum.
+const OPTIMALITY: f64 = 1e-3;
+
 impl StateFeedback {
+    /// Whether `gamma` of a mode (from 0) is its optimum to one part in a thousand, or the disturbance
+    /// is rejected completely ([`REJECTION`]); `None` where no `gamma` was asked for.
+    pub fn is_optimal(&self, mode: usize) -> Option<bool> {
+        let (gamma, optimum) = (self.gamma.as_ref()?[mode], self.optimum.as_ref()?[mode]);
+        let units = &self.certificate.units;
+        let rejection = REJECTION * units.performance / units.disturbance;
+        Some(gamma <= (1.0 + OPTIMALITY) * optimum.max(rejection))
+    }
+
     /// Proves, from these very doubles, decay, attenuation and dwell time on this plant.
     ///
     /// # Errors

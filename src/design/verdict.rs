@@ -72,7 +72,7 @@ pub struct ConflictingBlock {
     pub weight: f64,
 }
 
-/// A change of the design that was tried on the margin problem and makes it feasible.
+/// A change of the design that was tried, all the way to certified gains, and works.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Advice {
@@ -183,12 +183,15 @@ impl fmt::Display for Infeasibility {
                 f,
                 "; none of the usual changes (slower decay, dwell, fewer tracked outputs) helps"
             ),
-            false => {
-                let advice: Vec<String> = self.advice.iter().map(ToString::to_string).collect();
-                write!(f, "; {}", advice.join("; "))
-            }
+            false => write!(f, "; {}", join(&self.advice)),
         }
     }
+}
+
+/// Everything that helps, in one line.
+fn join(advice: &[Advice]) -> String {
+    let advice: Vec<String> = advice.iter().map(ToString::to_string).collect();
+    advice.join("; ")
 }
 
 /// The solver came back with nothing that could be a solution.
@@ -224,23 +227,61 @@ pub enum DesignError {
     #[error("the solver gave no solution: {0}")]
     Solver(#[from] SolverFailure),
     /// The gains were found, but their certificate does not check.
-    #[error(
-        "the design could not be certified: {0}; scale the plant by nominal values or ask for a slower decay"
-    )]
-    Uncertified(#[from] super::CertificateError),
+    #[error("{0}")]
+    Uncertified(Uncertified),
 }
 
-/// The verdict on a conflict.
+/// A certificate that does not check, and what would help.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Uncertified {
+    /// What could not be proved.
+    pub reason: super::CertificateError,
+    /// Changes that were tried and help; empty when none of those tried does.
+    pub advice: Vec<Advice>,
+}
+
+impl fmt::Display for Uncertified {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let help = match self.advice.is_empty() {
+            true => "give nominal values of the signals or ask for another decay".into(),
+            false => join(&self.advice),
+        };
+        write!(
+            f,
+            "the design could not be certified: {}; {help}",
+            self.reason
+        )
+    }
+}
+
+impl From<super::CertificateError> for DesignError {
+    fn from(reason: super::CertificateError) -> Self {
+        Self::Uncertified(Uncertified {
+            reason,
+            advice: Vec::new(),
+        })
+    }
+}
+
 #[cfg(feature = "design")]
-pub(crate) fn infeasible(
-    margin: f64,
-    weights: Vec<(BlockName, f64)>,
-    advice: Vec<Advice>,
-) -> DesignError {
+impl DesignError {
+    /// Where advice on this error belongs; `None` where a changed request is not what is missing.
+    pub(crate) fn advice_mut(&mut self) -> Option<&mut Vec<Advice>> {
+        match self {
+            Self::Infeasible(infeasibility) => Some(&mut infeasibility.advice),
+            Self::Uncertified(uncertified) => Some(&mut uncertified.advice),
+            Self::Request(_) | Self::Solver(_) => None,
+        }
+    }
+}
+
+/// The verdict on a conflict, without advice.
+#[cfg(feature = "design")]
+pub(crate) fn infeasible(margin: f64, weights: Vec<(BlockName, f64)>) -> DesignError {
     DesignError::Infeasible(Infeasibility {
         margin: margin.min(0.0),
         blocks: by_weight(weights),
-        advice,
+        advice: Vec::new(),
     })
 }
 

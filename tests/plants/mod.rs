@@ -130,6 +130,217 @@ pub fn random_plant(seed: u64, sample_time: f64) -> SwitchedPlant {
     SwitchedPlant { sample_time, modes }
 }
 
+/// Three modes, two inputs, three outputs, drawn at random: a plant on which the solver used to stop on
+/// its way to the optimum.
+pub fn three_modes() -> SwitchedPlant {
+    let c = rows([
+        [
+            -0.1828389745977349,
+            0.5405251317548021,
+            1.9350880340988528,
+            -0.2696203273419135,
+        ],
+        [
+            -0.24355867907910456,
+            1.0023136012756912,
+            -0.8864599431605871,
+            -0.291720232439864,
+        ],
+        [
+            0.8825389674564839,
+            0.5803500161908991,
+            0.09151670328235219,
+            0.6701043548284794,
+        ],
+    ]);
+    let e = rows([
+        [-2.8281623068437627],
+        [1.02130681750008],
+        [-0.9596447598081417],
+        [-1.6686198426559695],
+    ]);
+    let modes = [
+        (
+            rows([
+                [
+                    0.7125116285160216,
+                    -0.8922161757038342,
+                    0.14596379005899493,
+                    -0.1982158148479428,
+                ],
+                [
+                    -0.15802580361408125,
+                    -0.07526779683080423,
+                    -0.7052036464245808,
+                    -0.08097063444076864,
+                ],
+                [
+                    -0.30205723074984525,
+                    1.1601027068410452,
+                    0.07882506749162922,
+                    -0.12310803446767714,
+                ],
+                [
+                    -0.09820112629061915,
+                    -0.23322373973703003,
+                    -0.36836689396024835,
+                    -0.13643374585374596,
+                ],
+            ]),
+            rows([
+                [0.48194538850678587, -0.2385536065733667],
+                [0.9577587029597641, -0.19980212906658],
+                [0.024259565076664623, 1.545820851212812],
+                [0.5451055226876446, -0.505228735614018],
+            ]),
+        ),
+        (
+            rows([
+                [
+                    0.12683369859759633,
+                    0.32141096682563763,
+                    -0.20405992668447798,
+                    -0.4938564951352328,
+                ],
+                [
+                    0.011986109926624841,
+                    -0.024200538315740216,
+                    0.6448903916883212,
+                    0.3429118232004964,
+                ],
+                [
+                    0.08892288781864208,
+                    0.5100188592031903,
+                    -0.09429426087698728,
+                    -0.42480401095405235,
+                ],
+                [
+                    0.2679667646642641,
+                    0.2672694359331767,
+                    -0.09856380293597387,
+                    -0.35915366330498033,
+                ],
+            ]),
+            rows([
+                [0.22915390521326254, -2.4938942784579905],
+                [0.690124770162812, 0.4913682607449912],
+                [-1.6388571438904884, 0.06135350983817159],
+                [-0.9640996635412404, 0.7572210447581504],
+            ]),
+        ),
+        (
+            rows([
+                [
+                    0.4562224234357534,
+                    0.20420338772850646,
+                    0.20441639810414272,
+                    0.3086687243206393,
+                ],
+                [
+                    0.09473336652949163,
+                    -0.17340599844361584,
+                    -0.21707839615101046,
+                    -0.21706720705258603,
+                ],
+                [
+                    0.3716543167506595,
+                    -0.39615205792523034,
+                    -0.1617748908151345,
+                    -0.08714261702151574,
+                ],
+                [
+                    0.06093154928888757,
+                    0.15607284186952003,
+                    -0.33883779816968224,
+                    -0.46929417360271386,
+                ],
+            ]),
+            rows([
+                [-0.004414232621967487, 1.2135638252860816],
+                [0.7570580592965243, 0.21565078369996044],
+                [-0.3171556440173552, 0.2932336958002246],
+                [-0.24333508574217566, 0.817206580492595],
+            ]),
+        ),
+    ];
+    let modes = modes.map(|(a, b)| mode(a, b, c.clone(), e.clone(), DMatrix::zeros(3, 1)));
+    SwitchedPlant {
+        sample_time: 0.5,
+        modes: modes.to_vec(),
+    }
+}
+
+/// Two first-order channels that have nothing to do with each other, the first disturbed; one mode per
+/// size of the disturbance.
+pub fn two_channels(disturbances: &[f64]) -> SwitchedPlant {
+    let identity = DMatrix::identity(2, 2);
+    let channel = |&size: &f64| {
+        let a = rows([[0.9, 0.0], [0.0, 0.8]]);
+        let e = rows([[size], [0.0]]);
+        mode(
+            a,
+            identity.clone(),
+            identity.clone(),
+            e,
+            DMatrix::zeros(2, 1),
+        )
+    };
+    SwitchedPlant {
+        sample_time: 1.0,
+        modes: disturbances.iter().map(channel).collect(),
+    }
+}
+
+/// A state that drives another; the driven one is unstable in the first mode, and the disturbance acts
+/// on it alone.
+pub fn half_unstable() -> SwitchedPlant {
+    let driven = |pole: f64| {
+        mode(
+            rows([[pole, 0.1], [0.0, 0.8]]),
+            rows([[0.0], [1.0]]),
+            DMatrix::identity(2, 2),
+            rows([[0.1], [0.0]]),
+            DMatrix::zeros(2, 1),
+        )
+    };
+    SwitchedPlant {
+        sample_time: 0.1,
+        modes: vec![driven(1.05), driven(0.9)],
+    }
+}
+
+/// A plant of one to five states whose modes are variations of one another, some of them unstable; each
+/// state is disturbed with a chance of one half.
+pub fn sparsely_disturbed(seed: u64) -> SwitchedPlant {
+    let mut lottery = Lottery(seed.wrapping_mul(0x9E3779B97F4A7C15) + 7);
+    let n = lottery.between(1, 5);
+    let (m, p) = (lottery.between(1, 3), lottery.between(1, n.min(3)));
+    let (a, b, c) = (
+        lottery.matrix(n, n),
+        lottery.matrix(n, m),
+        lottery.matrix(p, n),
+    );
+    let e = lottery.matrix(n, 1).map(|value| value.max(0.0));
+    let modes = lottery.between(1, 3);
+    let variation = |_| {
+        let own = &a + 0.1 * lottery.matrix(n, n);
+        let radius = 0.75 + 0.25 * lottery.number();
+        let scale = radius / ftc::plant::spectral_radius(&own);
+        let input = &b + 0.1 * lottery.matrix(n, m);
+        mode(
+            own * scale,
+            input,
+            c.clone(),
+            e.clone(),
+            DMatrix::zeros(p, 1),
+        )
+    };
+    SwitchedPlant {
+        sample_time: 0.5,
+        modes: (0..modes).map(variation).collect(),
+    }
+}
+
 /// A three-phase rectifier in amperes and volts, states (i_d, i_q, v_dc), sampled at 0.1 ms: 10 mH,
 /// 0.3 ohm, 2 mF, 50 Hz, 311 V phase amplitude, 600 V on the DC side, one mode per load.
 /// Linearised averaged model; inputs are the converter's modulation indices.

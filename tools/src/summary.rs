@@ -78,14 +78,29 @@ fn feedback(design: &Design, control: &StateFeedback) -> Vec<(String, String)> {
     ];
     lines.extend(internal_model(design, control));
     for (index, radius) in control.spectral_radius.iter().enumerate() {
-        let gamma = control.gamma.as_ref().map(|gamma| gamma[index]);
-        let gamma = gamma.map_or("no disturbance".into(), |gamma| format!("gamma {gamma:.4}"));
+        let gamma = attenuation(control, index);
         lines.push(line(
             format!("mode {}", index + 1),
             format!("{gamma}, spectral radius {radius:.4}"),
         ));
     }
     lines
+}
+
+/// What is proved of the disturbance's way to the performance signal in one mode, and whether that is
+/// the best there is.
+fn attenuation(control: &StateFeedback, mode: usize) -> String {
+    let Some(gamma) = control.gamma.as_ref().map(|gamma| gamma[mode]) else {
+        return "no disturbance".into();
+    };
+    let gamma = match gamma < 1e-3 {
+        true => format!("gamma {gamma:.1e}"),
+        false => format!("gamma {gamma:.4}"),
+    };
+    match control.is_optimal(mode) {
+        Some(false) => gamma + " (not proved optimal)",
+        _ => gamma,
+    }
 }
 
 /// The periods at which the tracking error vanishes beside its constant part.
@@ -222,6 +237,7 @@ pub fn json(design: &Design) -> String {
         "feasible": true,
         "certified": control.is_some(),
         "gamma": control.and_then(|c| c.gamma.clone()),
+        "gamma_is_optimal": control.and_then(|c| (0..c.modes.len()).map(|mode| c.is_optimal(mode)).collect::<Option<Vec<_>>>()),
         "decay": control.map(|c| c.spec.decay),
         "spectral_radius": control.map(|c| c.spectral_radius.clone()),
         "dwell_time_samples": control.and_then(|c| c.dwell.map(|dwell| dwell.samples)),
@@ -258,16 +274,16 @@ pub fn json_of_failure(asked: &ControlSpec, error: &DesignError) -> String {
                 .iter()
                 .map(|block| json!({ "block": block.name.to_string(), "weight": block.weight }))
                 .collect(),
-            infeasibility
-                .advice
-                .iter()
-                .map(ToString::to_string)
-                .collect(),
+            infeasibility.advice.as_slice(),
         ),
-        DesignError::Uncertified(_) => (Value::Bool(true), Vec::new(), Vec::new()),
-        DesignError::Request(_) | DesignError::Solver(_) => (Value::Null, Vec::new(), Vec::new()),
+        DesignError::Uncertified(uncertified) => {
+            (Value::Bool(true), Vec::new(), uncertified.advice.as_slice())
+        }
+        DesignError::Request(_) | DesignError::Solver(_) => {
+            (Value::Null, Vec::new(), [].as_slice())
+        }
     };
-    let advice: Vec<String> = advice;
+    let advice: Vec<String> = advice.iter().map(ToString::to_string).collect();
     pretty(&json!({
         "feasible": feasible,
         "certified": false,

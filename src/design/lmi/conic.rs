@@ -100,30 +100,51 @@ impl Conic {
     }
 
     /// Minimises `cost' x`. What comes back is a candidate, whatever the solver calls it.
+    ///
+    /// Now and then a factorisation breaks down in the very first iterations, for no fault of the
+    /// problem: another way of factorising then goes through.
     pub(super) fn solve(self, cost: &[f64]) -> Result<Solved, SolverFailure> {
-        let quadratic = CscMatrix::zeros((cost.len(), cost.len()));
         let coefficients = self.coefficients();
+        let mut failed = None;
+        for settings in settings() {
+            match self.attempt(cost, &coefficients, settings) {
+                Ok(solved) => return Ok(solved),
+                Err(failure) => failed = failed.or(Some(failure)),
+            }
+        }
+        Err(failed.unwrap_or(SolverFailure::Refused))
+    }
+
+    /// One run of the solver.
+    fn attempt(
+        &self,
+        cost: &[f64],
+        coefficients: &CscMatrix<f64>,
+        settings: DefaultSettings<f64>,
+    ) -> Result<Solved, SolverFailure> {
+        let quadratic = CscMatrix::zeros((cost.len(), cost.len()));
         let mut solver = DefaultSolver::new(
             &quadratic,
             cost,
-            &coefficients,
+            coefficients,
             &self.constants,
             &self.cones,
-            settings(),
+            settings,
         )
         .map_err(|_| SolverFailure::Refused)?;
         // The solver panics where a factorisation fails on numbers that have broken down.
         catch_unwind(AssertUnwindSafe(|| solver.solve()))
             .map_err(|_| SolverFailure::NumericalTrouble)?;
         let solution = &solver.solution;
-        let finite = solution.x.iter().all(|value| value.is_finite());
+        let fits = solution.x.iter().all(|value| value.is_finite())
+            && solution.r_prim.max(solution.r_dual) < LARGEST_RESIDUAL;
         match solution.status {
             SolverStatus::Solved
             | SolverStatus::AlmostSolved
             | SolverStatus::InsufficientProgress
             | SolverStatus::NumericalError
             | SolverStatus::MaxIterations
-                if finite =>
+                if fits =>
             {
                 Ok(Solved {
                     multipliers: traces(&self.cones, &solution.z),
@@ -157,10 +178,13 @@ impl Conic {
     }
 }
 
-/// One thread, so that the same problem gives the same bits; tight tolerances, since strict
-/// inequalities live from the last digits.
-fn settings() -> DefaultSettings<f64> {
-    DefaultSettings {
+/// Relative residuals above this mean that the solver stopped on its way, wherever it was.
+const LARGEST_RESIDUAL: f64 = 1e-5;
+
+/// The ways to solve, in the order they are tried. One thread, so that the same problem gives the
+/// same bits; tight tolerances, since strict inequalities live from the last digits.
+fn settings() -> [DefaultSettings<f64>; 4] {
+    let usual = DefaultSettings {
         verbose: false,
         direct_solve_method: "faer".into(),
         max_threads: 1,
@@ -169,7 +193,20 @@ fn settings() -> DefaultSettings<f64> {
         tol_gap_rel: 1e-9,
         tol_feas: 1e-9,
         ..DefaultSettings::default()
-    }
+    };
+    let other_factorisation = DefaultSettings {
+        direct_solve_method: "qdldl".into(),
+        ..usual.clone()
+    };
+    let undecomposed = DefaultSettings {
+        chordal_decomposition_enable: false,
+        ..other_factorisation.clone()
+    };
+    let unequilibrated = DefaultSettings {
+        equilibrate_enable: false,
+        ..undecomposed.clone()
+    };
+    [usual, other_factorisation, undecomposed, unequilibrated]
 }
 
 /// What a status without a candidate means to the user.

@@ -11,4 +11,4 @@ mod expression;
 mod problem;
 
 pub use expression::{Affine, Variable};
-pub use problem::{Candidate, Inequality, Margin, Problem};
+pub use problem::{Candidate, Inequality, Margin, Problem, trace};

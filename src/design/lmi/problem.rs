@@ -133,18 +133,25 @@ impl Problem {
         self.bounds.push(number(value) - trace(expressions));
     }
 
-    /// Minimises an unknown number.
+    /// Demands that an unknown number be at least `value`.
+    pub fn require_at_least(&mut self, variable: &Variable, value: f64) {
+        self.bounds.push(variable.expression() - number(value));
+    }
+
+    /// Minimises a number (1 x 1).
     ///
     /// # Errors
     /// When the solver returns nothing that could be a solution.
-    pub fn minimise(&self, objective: &Variable) -> Result<Candidate, SolverFailure> {
+    pub fn minimise(&self, objective: impl Into<Affine>) -> Result<Candidate, SolverFailure> {
+        let objective = objective.into();
         let mut cost = vec![0.0; self.scalars];
-        cost[objective.scalar(0, 0)] = 1.0;
+        objective.for_each_coefficient(|scalar, _, _, value| cost[scalar] += value);
         let solved = self.conic(None).solve(&cost)?;
+        let constant = objective.constant(0, 0);
         Ok(Candidate {
             scalars: solved.primal,
-            objective: solved.objective,
-            bound: solved.bound,
+            objective: solved.objective + constant,
+            bound: solved.bound + constant,
         })
     }
 
@@ -192,7 +199,7 @@ fn number(value: f64) -> Affine {
 }
 
 /// The sum of all diagonals, 1 x 1.
-fn trace(expressions: &[Affine]) -> Affine {
+pub fn trace(expressions: &[Affine]) -> Affine {
     let mut sum = number(0.0);
     for expression in expressions {
         let size = expression.shape().0;

@@ -216,6 +216,7 @@ fn error_decay(
     (problem, unknowns)
 }
 
+/// The observer with given `H`, or what would help.
 fn design(
     plant: &SwitchedPlant,
     spec: &ObserverSpec,
@@ -224,7 +225,25 @@ fn design(
     note: Option<String>,
     h: Vec<Vec<DMatrix<f64>>>,
 ) -> Result<ObserverDesign, DesignError> {
-    let model = ErrorModel::new(plant, &units.per_unit(), &h);
+    let attempt = |spec: &ObserverSpec| attempt(plant, spec, units, kind, note.clone(), &h);
+    attempt(spec).map_err(|mut error| {
+        if let Some(found) = error.advice_mut() {
+            *found = advice(spec, &|candidate| attempt(candidate).is_ok());
+        }
+        error
+    })
+}
+
+/// The same without advice.
+fn attempt(
+    plant: &SwitchedPlant,
+    spec: &ObserverSpec,
+    units: &OwnedUnits,
+    kind: ObserverKind,
+    note: Option<String>,
+    h: &[Vec<DMatrix<f64>>],
+) -> Result<ObserverDesign, DesignError> {
+    let model = ErrorModel::new(plant, &units.per_unit(), h);
     model.check_detectable(spec)?;
     let mut gains = Vec::new();
     let mut matrices = Vec::new();
@@ -232,11 +251,7 @@ fn design(
         let (problem, unknowns) = error_decay(&model, spec, &group);
         let margin = problem.margin()?;
         if margin.margin < SMALLEST_MARGIN {
-            return Err(infeasible(
-                margin.margin,
-                margin.weights,
-                advice(&model, spec),
-            ));
+            return Err(infeasible(margin.margin, margin.weights));
         }
         for unknown in &unknowns {
             let slack = unknown.slack.value(&margin.scalars);
@@ -263,8 +278,8 @@ fn design(
             note,
             gains: gains.iter().map(|gain| Gain(physical(gain))).collect(),
             decoupling: h
-                .into_iter()
-                .map(|row| row.into_iter().map(Gain).collect())
+                .iter()
+                .map(|row| row.iter().cloned().map(Gain).collect())
                 .collect(),
         },
         dwell: None,
@@ -291,28 +306,18 @@ fn design(
     outcome.map(|()| found)
 }
 
-/// Changes that were tried and make the observer feasible.
-fn advice(model: &ErrorModel, spec: &ObserverSpec) -> Vec<Advice> {
-    let feasible = |candidate: &ObserverSpec| {
-        candidate
-            .lyapunov
-            .groups(model.outputs.len())
-            .iter()
-            .all(|group| {
-                let margin = error_decay(model, candidate, group).0.margin();
-                margin.is_ok_and(|found| found.margin > 1e3 * SMALLEST_MARGIN)
-            })
-    };
+/// The changes among the usual ones that work.
+fn advice(spec: &ObserverSpec, works: &dyn Fn(&ObserverSpec) -> bool) -> Vec<Advice> {
     let slower = Advice::DECAYS.into_iter().find(|&decay| {
         let candidate = ObserverSpec {
             decay,
             ..spec.clone()
         };
-        decay > spec.decay && feasible(&candidate)
+        decay > spec.decay && works(&candidate)
     });
     let other = spec.lyapunov.weaker().iter().find(|&&lyapunov| {
         spec.decay < 1.0
-            && feasible(&ObserverSpec {
+            && works(&ObserverSpec {
                 lyapunov,
                 ..spec.clone()
             })

@@ -26,16 +26,19 @@ pub(super) struct Frame {
     /// `L`: `x~ = L xi`.
     basis: DMatrix<f64>,
     inverse: DMatrix<f64>,
+    /// `U`: `u = U nu`.
+    input: DMatrix<f64>,
     disturbance: f64,
     performance: f64,
 }
 
 impl Frame {
     /// The design's own coordinates.
-    pub fn identity(size: usize) -> Self {
+    pub fn identity(size: usize, inputs: usize) -> Self {
         Self {
             basis: DMatrix::identity(size, size),
             inverse: DMatrix::identity(size, size),
+            input: DMatrix::identity(inputs, inputs),
             disturbance: 1.0,
             performance: 1.0,
         }
@@ -43,7 +46,7 @@ impl Frame {
 
     /// Coordinates in which the mean Lyapunov matrix of a rough solution (found in one frame) is
     /// the identity; `None` when it is not positive definite.
-    fn of(parts: &[Part]) -> Option<Self> {
+    fn of(models: &[AugmentedMode], parts: &[Part]) -> Option<Self> {
         let first = &parts.first()?.lyapunov;
         let cores = parts.iter().map(|part| &part.lyapunov.core);
         let sum = cores.fold(0.0 * &first.core, |sum, core| sum + core);
@@ -51,12 +54,31 @@ impl Frame {
         let basis = &first.basis * root;
         let inverse = basis.clone().try_inverse()?;
         let sound = inverse.iter().all(|value| value.is_finite());
+        let inputs = models[0].b.ncols();
         sound.then_some(Self {
             basis,
             inverse,
-            disturbance: 1.0,
-            performance: 1.0,
+            ..Self::identity(0, inputs)
         })
+    }
+
+    /// The same with inputs whose effects on state and performance signal, taken together, are
+    /// orthonormal.
+    fn with_inputs(mut self, models: &[AugmentedMode], parts: &[Part]) -> Self {
+        let inputs = models[0].b.ncols();
+        let effect = parts.iter().map(|part| {
+            let model = &models[part.mode];
+            let (state, signal) = (&self.inverse * &model.b, &model.d / self.performance);
+            state.tr_mul(&state) + signal.tr_mul(&signal)
+        });
+        let effect = effect.fold(DMatrix::zeros(inputs, inputs), |sum, effect| sum + effect);
+        let root = effect
+            .cholesky()
+            .and_then(|factor| factor.l().transpose().try_inverse());
+        if let Some(root) = root.filter(|root| root.iter().all(|value| value.is_finite())) {
+            self.input = root;
+        }
+        self
     }
 
     /// Coordinates in which linear-quadratic regulators of the modes, each with a decay somewhat faster
@@ -77,13 +99,14 @@ impl Frame {
                 lyapunov: FactoredLyapunov::plain(symmetric),
             })
         };
-        Self::of(&group.iter().map(part).collect::<Option<Vec<_>>>()?)
+        let parts = group.iter().map(part).collect::<Option<Vec<_>>>()?;
+        Some(Self::of(models, &parts)?.with_inputs(models, &parts))
     }
 
     /// Coordinates from a stabilising solution, with the units in which disturbance and closed-loop
     /// performance signal are near one.
     pub fn of_stabilised(models: &[AugmentedMode], parts: &[Part]) -> Option<Self> {
-        let mut frame = Self::of(parts)?;
+        let mut frame = Self::of(models, parts)?;
         let largest = |matrices: &mut dyn Iterator<Item = DMatrix<f64>>| {
             let norm = matrices.map(|matrix| matrix.norm()).fold(0.0, f64::max);
             if norm > 0.0 { norm } else { 1.0 }
@@ -99,18 +122,17 @@ impl Frame {
         }));
         frame.disturbance = disturbance;
         frame.performance = performance;
-        Some(frame)
+        Some(frame.with_inputs(models, parts))
     }
 
     /// Coordinates from a rough optimum of (T2) at level `g`, in which the new optimum is near 1.
-    pub fn of_attenuated(parts: &[Part], level: f64) -> Option<Self> {
+    pub fn of_attenuated(models: &[AugmentedMode], parts: &[Part], level: f64) -> Option<Self> {
         let disturbance = level.sqrt();
-        (disturbance.is_normal() && disturbance > 0.0)
-            .then(|| Self::of(parts))?
-            .map(|frame| Self {
-                disturbance,
-                ..frame
-            })
+        let frame = Self::of(models, parts)?.with_inputs(models, parts);
+        (disturbance.is_normal() && disturbance > 0.0).then_some(Self {
+            disturbance,
+            ..frame
+        })
     }
 
     /// The models in these coordinates.
@@ -119,11 +141,11 @@ impl Frame {
             .iter()
             .map(|model| AugmentedMode {
                 a: &self.inverse * &model.a * &self.basis,
-                b: &self.inverse * &model.b,
+                b: &self.inverse * &model.b * &self.input,
                 e: &self.inverse * &model.e / self.disturbance,
                 r: &self.inverse * &model.r,
                 h: &model.h * &self.basis / self.performance,
-                d: &model.d / self.performance,
+                d: &model.d * &self.input / self.performance,
             })
             .collect()
     }
@@ -142,7 +164,7 @@ impl Frame {
     pub fn restore(&self, parts: Vec<Part>) -> Vec<Part> {
         let back = |part: Part| Part {
             mode: part.mode,
-            gain: part.gain * &self.inverse,
+            gain: &self.input * part.gain * &self.inverse,
             lyapunov: FactoredLyapunov {
                 basis: &self.basis * part.lyapunov.basis,
                 core: part.lyapunov.core / self.performance.powi(2),

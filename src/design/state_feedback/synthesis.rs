@@ -7,7 +7,7 @@
 use super::advice;
 use super::frame::{Frame, Part};
 use super::theorem;
-use super::{ModeGains, StateFeedback};
+use super::{ModeGains, REJECTION, StateFeedback};
 use crate::design::augmented::{AugmentedMode, augment, scaled};
 use crate::design::certificate::{ControlCertificate, FactoredLyapunov, provable_dwell};
 use crate::design::lmi::Margin;
@@ -18,7 +18,7 @@ use crate::plant::{Dimensions, SwitchedPlant, spectral_radius};
 use nalgebra::DMatrix;
 
 /// Relative sacrifices of `g = gamma^2` for a margin, tried in turn until the certificate holds.
-const SACRIFICES: [f64; 4] = [2e-5, 1e-4, 1e-3, 1e-2];
+const SACRIFICES: [f64; 6] = [2e-5, 1e-4, 1e-3, 1e-2, 1e-1, 1.0];
 
 /// A margin below this is no margin: the solver's own accuracy.
 const SMALLEST_MARGIN: f64 = 1e-9;
@@ -30,10 +30,10 @@ const SURE_MARGIN: f64 = 1e-6;
 const THICK_MARGIN: f64 = 1e-2;
 
 /// How often better coordinates are sought.
-const REFRAMINGS: usize = 8;
+const REFRAMINGS: usize = 12;
 
-/// How well two solutions of the same optimum must agree, relatively.
-const AGREEMENT: f64 = 1e-6;
+/// A least level that better coordinates change by less than this, relatively, is the least.
+const AGREEMENT: f64 = 1e-5;
 
 /// Designs the state feedback that is asked for and proves it.
 ///
@@ -43,6 +43,20 @@ const AGREEMENT: f64 = 1e-6;
 /// An ill-formed request, a conflict between inequalities (named, with advice that was tried), a
 /// failure of the solver, or a result that cannot be certified.
 pub fn synthesise(
+    plant: &SwitchedPlant,
+    spec: &ControlSpec,
+    scaling: &Scaling,
+) -> Result<StateFeedback, DesignError> {
+    attempt(plant, spec, scaling).map_err(|mut error| {
+        if let Some(advice) = error.advice_mut() {
+            *advice = advice::search(plant, spec, scaling);
+        }
+        error
+    })
+}
+
+/// The same without advice.
+fn attempt(
     plant: &SwitchedPlant,
     spec: &ControlSpec,
     scaling: &Scaling,
@@ -61,8 +75,7 @@ pub fn synthesise(
         match road.stabilised(&group)? {
             Verdict::Stable(parts) => stable.push(parts),
             Verdict::Conflict(margin) => {
-                let advice = advice::search(plant, spec, scaling);
-                return Err(infeasible(margin.margin, margin.weights, advice));
+                return Err(infeasible(margin.margin, margin.weights));
             }
         }
     }
@@ -73,14 +86,16 @@ pub fn synthesise(
     }
 }
 
-/// Whether decay and guarantee can be had at all; the cheap question behind every advice.
-pub(super) fn is_feasible(plant: &SwitchedPlant, spec: &ControlSpec, scaling: &Scaling) -> bool {
+/// Whether a request leads all the way to certified gains. The cheap question comes first: whether
+/// decay and guarantee can be had at all.
+pub(super) fn succeeds(plant: &SwitchedPlant, spec: &ControlSpec, scaling: &Scaling) -> bool {
     let units = Units::choose(plant, spec, scaling);
     let models = augment(plant, spec, &units);
-    spec.lyapunov.groups(models.len()).iter().all(|group| {
+    let stabilised = spec.lyapunov.groups(models.len()).iter().all(|group| {
         let found = stable(&models, spec, group);
         found.is_ok_and(|(margin, parts)| parts.is_some() && margin.margin >= SURE_MARGIN)
-    })
+    });
+    stabilised && attempt(plant, spec, scaling).is_ok()
 }
 
 /// Stabilising gains of a group with their margin, sought in the design's coordinates and, where
@@ -90,19 +105,20 @@ fn stable(
     spec: &ControlSpec,
     group: &[usize],
 ) -> Result<(Margin, Option<Vec<Part>>), SolverFailure> {
-    let (margin, parts) = theorem::stabilise(models, spec, group)?;
-    if margin.margin >= SURE_MARGIN {
-        return Ok((margin, Some(parts)));
-    }
+    let plain = match theorem::stabilise(models, spec, group) {
+        Ok((margin, parts)) if margin.margin >= SURE_MARGIN => return Ok((margin, Some(parts))),
+        uncertain => uncertain,
+    };
     let regulated = Frame::of_regulated(models, group, spec.decay).and_then(|frame| {
         let (margin, parts) = theorem::stabilise(&frame.view(models), spec, group).ok()?;
         (margin.margin >= SURE_MARGIN).then(|| (margin, frame.restore(parts)))
     });
-    Ok(match regulated {
-        Some((margin, parts)) => (margin, Some(parts)),
-        None if margin.margin >= SMALLEST_MARGIN => (margin, Some(parts)),
-        None => (margin, None),
-    })
+    if let Some((margin, parts)) = regulated {
+        return Ok((margin, Some(parts)));
+    }
+    let (margin, parts) = plain?;
+    let shown = margin.margin >= SMALLEST_MARGIN;
+    Ok((margin, shown.then_some(parts)))
 }
 
 /// The gains solved for again in the coordinates they suggest, as long as the margin is thin and
@@ -135,6 +151,16 @@ enum Verdict {
     Conflict(Margin),
 }
 
+/// The least level of a group.
+struct Optimum {
+    /// `g = gamma^2` in the design's units.
+    level: f64,
+    /// No `g` is below this, as the solver sees it; zero where it does not tell.
+    bound: f64,
+    /// Coordinates in which the solution is near the identity.
+    frame: Frame,
+}
+
 /// What every stage works on.
 struct Road<'a> {
     plant: &'a SwitchedPlant,
@@ -160,26 +186,36 @@ impl Road<'_> {
     }
 
     /// The least `g` of a group, and coordinates in which (T2) is at ease near it: each solution's
-    /// coordinates serve the next, in which the optimum must be 1 once both agree.
-    fn least_level(&self, group: &[usize], start: &[Part]) -> Result<(f64, Frame), SolverFailure> {
-        let mut frame = Frame::of_stabilised(&self.models, start)
-            .unwrap_or_else(|| Frame::identity(self.models[0].a.nrows()));
-        let mut found = None;
+    /// coordinates serve the next, which looks at Lyapunov matrices further away, until both agree.
+    fn least_level(&self, group: &[usize], start: &[Part]) -> Result<Optimum, SolverFailure> {
+        let models = &self.models;
+        let (size, inputs) = models[0].b.shape();
+        let mut frame =
+            Frame::of_stabilised(models, start).unwrap_or_else(|| Frame::identity(size, inputs));
+        let (mut least, mut bound): (Option<f64>, f64) = (None, 0.0);
         for _ in 0..REFRAMINGS {
-            let view = frame.view(&self.models);
-            let Ok((candidate, parts)) = theorem::least_level(&view, self.spec, group) else {
+            let floor = frame.view_level(REJECTION.powi(2));
+            let view = frame.view(models);
+            let Ok(found) = theorem::least_level(&view, self.spec, group, floor) else {
                 break;
             };
-            let level = frame.restore_level(candidate.objective);
-            let agrees = (candidate.objective - 1.0).abs() < AGREEMENT;
-            found = Some((level, frame.clone()));
-            let better = Frame::of_attenuated(&frame.restore(parts), level);
-            match better.filter(|_| !agrees) {
-                Some(better) => frame = better,
-                None => break,
+            let level = frame.restore_level(found.level.max(floor));
+            if least.is_some_and(|least| (level / least - 1.0).abs() < AGREEMENT) {
+                (least, bound) = (Some(level), frame.restore_level(found.bound.max(0.0)));
+                break;
             }
+            let parts = frame.restore(found.parts);
+            let Some(better) = Frame::of_attenuated(models, &parts, level) else {
+                break;
+            };
+            (least, frame) = (Some(level), better);
         }
-        found.ok_or(SolverFailure::NumericalTrouble)
+        let level = least.ok_or(SolverFailure::NumericalTrouble)?;
+        Ok(Optimum {
+            level,
+            bound,
+            frame,
+        })
     }
 
     /// Theorem T2: the least `gamma`, the gains that reach it but for a hair, and their proof.
@@ -191,24 +227,30 @@ impl Road<'_> {
         }
         let mut outcome = Err(DesignError::Solver(SolverFailure::NumericalTrouble));
         for sacrifice in SACRIFICES {
-            let mut levels = Levels::new(self);
-            let mut parts = Vec::new();
-            for (group, (level, frame)) in groups.iter().zip(&least) {
-                let relaxed = levels.set(group, *level, sacrifice);
-                let view = frame.view(&self.models);
-                match theorem::centred(&view, self.spec, group, frame.view_level(relaxed)) {
-                    Ok(found) => parts.extend(frame.restore(found)),
-                    Err(failure) => outcome = Err(failure.into()),
-                }
-            }
-            if parts.len() == self.models.len() {
-                outcome = self.certified(parts, Some(levels));
-            }
+            outcome = self.centred(&groups, &least, sacrifice);
             if outcome.is_ok() {
                 break;
             }
         }
         outcome
+    }
+
+    /// Gains of largest margin at the least levels but for a `sacrifice`, certified.
+    fn centred(
+        &self,
+        groups: &[Vec<usize>],
+        least: &[Optimum],
+        sacrifice: f64,
+    ) -> Result<StateFeedback, DesignError> {
+        let mut levels = Levels::new(self);
+        let mut parts = Vec::new();
+        for (group, least) in groups.iter().zip(least) {
+            let (frame, level) = (&least.frame, levels.set(group, least, sacrifice));
+            let view = frame.view(&self.models);
+            let found = theorem::centred(&view, self.spec, group, frame.view_level(level))?;
+            parts.extend(frame.restore(found));
+        }
+        self.certified(parts, Some(levels))
     }
 
     /// Puts the parts together in physical units, and proves the whole.
@@ -269,10 +311,10 @@ impl Levels {
 
     /// Notes the least level `g` of a group, gives up `sacrifice` of it, and returns the `g` that is
     /// left to prove.
-    fn set(&mut self, group: &[usize], level: f64, sacrifice: f64) -> f64 {
-        let relaxed = level.max(f64::MIN_POSITIVE) * (1.0 + sacrifice);
+    fn set(&mut self, group: &[usize], least: &Optimum, sacrifice: f64) -> f64 {
+        let relaxed = least.level * (1.0 + sacrifice);
         for &mode in group {
-            self.optimum[mode] = level.max(0.0).sqrt() * self.physical;
+            self.optimum[mode] = least.bound.sqrt() * self.physical;
             self.gamma[mode] = relaxed.sqrt() * self.physical;
         }
         relaxed

@@ -3,7 +3,7 @@
 use super::frame::Part;
 use crate::design::augmented::AugmentedMode;
 use crate::design::certificate::FactoredLyapunov;
-use crate::design::lmi::{Affine, Candidate, Inequality, Margin, Problem, Variable};
+use crate::design::lmi::{Affine, Inequality, Margin, Problem, Variable, trace};
 use crate::design::verdict::{BlockKind, BlockName, SolverFailure};
 use crate::design::{ControlSpec, Lyapunov, pseudo_inverse};
 use nalgebra::DMatrix;
@@ -191,15 +191,50 @@ pub(super) fn stabilise(
     Ok((margin, parts))
 }
 
-/// The least `g` of a group (T2), as the solver sees it, with the gains that come with it.
+/// How far, as a factor, Lyapunov matrices may be from the identity in one solution of
+/// [`least_level`], tried in turn.
+const REACHES: [f64; 3] = [1e2, 1e4, 1e6];
+
+/// What of `g` (about 1) may be lost to keep Lyapunov matrices near the identity where they are free.
+const NEARNESS: f64 = 1e-6;
+
+/// A solution of [`least_level`].
+pub(super) struct LeastLevel {
+    /// The `g` that is reached.
+    pub level: f64,
+    /// Below this no `g` is reached, in the solver's view.
+    pub bound: f64,
+    /// Gains and Lyapunov matrices.
+    pub parts: Vec<Part>,
+}
+
+/// The least `g >= floor` of a group (T2), as the solver sees it, with the gains that come with it,
+/// among Lyapunov matrices within reach of the identity. Without that limit the least `g` need not
+/// be attained: what the disturbance does not reach lets Lyapunov matrices grow or vanish for ever.
 pub(super) fn least_level(
     models: &[AugmentedMode],
     spec: &ControlSpec,
     group: &[usize],
-) -> Result<(Candidate, Vec<Part>), SolverFailure> {
+    floor: f64,
+) -> Result<LeastLevel, SolverFailure> {
+    let within = |reach| least_level_within(reach, models, spec, group, floor);
+    let farther = REACHES[1..].iter().copied();
+    farther.fold(within(REACHES[0]), |found, reach| {
+        found.or_else(|_| within(reach))
+    })
+}
+
+/// [`least_level`] with one reach.
+fn least_level_within(
+    reach: f64,
+    models: &[AugmentedMode],
+    spec: &ControlSpec,
+    group: &[usize],
+    floor: f64,
+) -> Result<LeastLevel, SolverFailure> {
     let mut problem = Problem::new();
     let unknowns = unknowns(&mut problem, models, spec.lyapunov, group);
-    let level = problem.scalar();
+    let (level, least) = (problem.scalar(), problem.scalar());
     let identity = level.times_identity(models[0].e.ncols());
     require_attenuation(
         &mut problem,
@@ -210,9 +245,22 @@ pub(super) fn least_level(
         &identity,
     );
     require_decay(&mut problem, models, spec, group, &unknowns);
-    let candidate = problem.minimise(&level)?;
-    let parts = read(group, &unknowns, &candidate.scalars)?;
-    Ok((candidate, parts))
+    problem.require_at_least(&level, floor);
+    problem.require_at_least(&least, 1.0 / reach);
+    let (matrices, total) = matrices(spec.lyapunov, &unknowns, models);
+    problem.require_trace_below(&matrices, reach * total);
+    let spread = (1.0 / (reach * total)) * trace(&matrices) - least.expression();
+    for (matrix, &mode) in matrices.into_iter().zip(group) {
+        let name = BlockName::new(BlockKind::Lyapunov, mode, mode);
+        let above = matrix - least.times_identity(models[0].a.nrows());
+        problem.require(Inequality::new(name, vec![vec![Some(above)]]));
+    }
+    let found = problem.minimise(level.expression() + NEARNESS * spread)?;
+    Ok(LeastLevel {
+        level: level.value(&found.scalars)[(0, 0)],
+        bound: found.bound - NEARNESS,
+        parts: read(group, &unknowns, &found.scalars)?,
+    })
 }
 
 /// How much larger than the identity the Lyapunov matrices of a centred solution may be on average.
