@@ -13,7 +13,8 @@ pub enum Variant {
     Ftc,
     /// The same gains, believing every sensor.
     NoFtc,
-    /// The same gains, told the true fault: the bound of any estimator.
+    /// The same gains, told the true fault: what a perfect estimate of it would give. One that also
+    /// takes up disturbance or noise may do better.
     ToldTheFault,
     /// The additive FTC of the paper's section III: gains of Theorem 1, no attenuation.
     Additive,
@@ -60,6 +61,8 @@ pub struct Report<'a> {
     pub residual: &'a [f64],
     /// Declared faults (p).
     pub flagged: &'a [bool],
+    /// Whether the residual was judged.
+    pub judged: bool,
 }
 
 /// Every signal of one sample.
@@ -93,6 +96,9 @@ pub struct Record {
     pub residual: Vec<f64>,
     /// Declared faults (p).
     pub flagged: Vec<bool>,
+    /// Whether the residual was judged: not just after a mode switch, nor where the input lies
+    /// outside what the healthy database spans.
+    pub judged: bool,
 }
 
 /// One run.
@@ -102,6 +108,9 @@ pub struct Trajectory {
     pub variant: Variant,
     /// One record per sample.
     pub records: Vec<Record>,
+    /// The first tick, if any, that the plant's equations could not be integrated through; what
+    /// follows it means nothing.
+    pub stalled: Option<u64>,
 }
 
 /// Figures of merit of one tracked output.
@@ -149,6 +158,7 @@ impl Regulator for Tolerant<'_> {
             fault: &estimator.fault,
             residual: &estimator.residual,
             flagged: &estimator.flagged,
+            judged: estimator.judged(),
         }
     }
 }
@@ -188,6 +198,7 @@ pub fn run_with(
         noise: true,
     };
     let mut records = Vec::with_capacity(plant.scenario().steps as usize);
+    let mut stalled = None;
     for _ in 0..plant.scenario().steps {
         plant.observe(&mut state, &external);
         regulator.tick(&state);
@@ -196,10 +207,17 @@ pub fn run_with(
             acting.copy_from_slice(regulator.command());
         }
         regulator.advance(&state, &acting);
-        plant.advance(&mut state, &acting);
+        let tick = state.tick;
+        if plant.advance(&mut state, &acting).is_err() {
+            stalled = stalled.or(Some(tick));
+        }
         acting.copy_from_slice(regulator.command());
     }
-    Trajectory { variant, records }
+    Trajectory {
+        variant,
+        records,
+        stalled,
+    }
 }
 
 fn record(plant: &PlantState, regulator: &dyn Regulator) -> Record {
@@ -219,6 +237,7 @@ fn record(plant: &PlantState, regulator: &dyn Regulator) -> Record {
         f_hat: report.fault.to_vec(),
         residual: report.residual.to_vec(),
         flagged: report.flagged.to_vec(),
+        judged: report.judged,
     }
 }
 

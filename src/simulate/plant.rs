@@ -4,6 +4,7 @@ mod derivative;
 
 pub use derivative::Change;
 
+use super::integrate::Stalled;
 use super::noise;
 use super::scenario::Scenario;
 use super::truth::{self, Truth};
@@ -197,8 +198,12 @@ impl PlantSimulator {
     }
 
     /// Moves to the next tick under input `u` (m), held over the sample.
-    pub fn advance(&self, state: &mut PlantState, u: &[f64]) {
-        match &self.truth {
+    ///
+    /// # Errors
+    /// [`Stalled`] where the nonlinear plant cannot be integrated; the tick then ends where that
+    /// became so, and later ticks go on from there.
+    pub fn advance(&self, state: &mut PlantState, u: &[f64]) -> Result<(), Stalled> {
+        let result = match &self.truth {
             Truth::Rectifier(rectifier) => truth::advance_rectifier(
                 rectifier,
                 state.mode,
@@ -207,10 +212,14 @@ impl PlantSimulator {
                 &state.disturbance,
                 self.plant.sample_time,
             ),
-            Truth::AsDesigned | Truth::Linear { .. } => self.advance_linear(state, u),
-        }
+            Truth::AsDesigned | Truth::Linear { .. } => {
+                self.advance_linear(state, u);
+                Ok(())
+            }
+        };
         kernel::bound(&mut state.x);
         state.tick = state.tick.saturating_add(1);
+        result
     }
 
     fn advance_linear(&self, state: &mut PlantState, u: &[f64]) {

@@ -173,6 +173,7 @@ impl Regulator for Predictive {
             fault: &self.silent,
             residual: self.offset.as_slice(),
             flagged: &self.calm,
+            judged: false,
         }
     }
 

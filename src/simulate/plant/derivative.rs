@@ -70,9 +70,9 @@ impl PlantSimulator {
                 self.plant.sample_time,
                 &mut trial.next,
             );
-            self.advance(trial, u);
+            let _ = self.advance(trial, u);
         } else {
-            self.advance(trial, u);
+            let _ = self.advance(trial, u);
             let mode = &self.plant.modes[trial.mode];
             trial.next.fill(0.0);
             kernel::add_product(&mut trial.next, &mode.b, change.command);
