@@ -242,14 +242,17 @@ fn record(plant: &PlantState, regulator: &dyn Regulator) -> Record {
 }
 
 impl Trajectory {
-    /// Figures of merit of each tracked output (rows of `tracked`, 0-based).
+    /// Figures of merit of each tracked output (rows of `tracked`, 0-based), as far as the plant could
+    /// be integrated.
     pub fn merits(&self, tracked: &[usize]) -> Vec<Merits> {
         tracked
             .iter()
             .enumerate()
             .map(|(index, &row)| {
+                let sound = |record: &&Record| self.stalled.is_none_or(|end| record.tick <= end);
                 let column = |pick: &dyn Fn(&Record) -> f64| {
-                    self.records.iter().map(pick).collect::<Vec<f64>>()
+                    let records = self.records.iter().take_while(sound);
+                    records.map(pick).collect::<Vec<f64>>()
                 };
                 let reference = column(&|r| r.reference[index]);
                 Merits {
