@@ -107,11 +107,13 @@ impl KnownDisturbance {
 /// The smallest threshold that is chosen automatically, relative to the nominal value.
 const SMALLEST_THRESHOLD: f64 = 1e-3;
 
-/// Deviations a threshold counts as when the user gave it in output units.
-const USUAL_SIGMAS: f64 = 6.0;
-
 /// Leverage beyond which the residual is not trusted.
 const LEVERAGE_LIMIT: f64 = 100.0;
+
+/// A threshold opens by so much more than the largest known response to the disturbance before that
+/// is learned. While least squares learns, what is left of any such response stays below `1 / ROOM` of
+/// that opening (Cauchy-Schwarz), hence below the half from which the estimator learns.
+const ROOM: f64 = 2.5;
 
 /// Variance of a harmonic of which nothing is known, in units of the noise variance.
 const UNKNOWN_VARIANCE: f64 = 1e6;
@@ -245,7 +247,7 @@ fn estimator(request: &Request, dims: Dimensions) -> Result<Estimator, String> {
     let harmonics = spec
         .disturbance
         .as_ref()
-        .map(|known| known_harmonics(known, spec, &request.plant, &thresholds));
+        .map(|known| known_harmonics(known, &request.plant, &thresholds));
     let harmonic_transfers = harmonics.as_ref().map_or_else(Vec::new, |known| {
         harmonics::transfers(&request.plant, known.period, known.count)
     });
@@ -387,19 +389,14 @@ fn thresholds(
 /// the thresholds need not be opened wider than that response while it is being learned.
 fn known_harmonics(
     known: &KnownDisturbance,
-    spec: &EstimatorSpec,
     plant: &SwitchedPlant,
     thresholds: &[f64],
 ) -> Harmonics {
     let period = known.period / plant.sample_time;
-    let sigmas = match spec.threshold {
-        Threshold::Sigmas(sigmas) => sigmas,
-        Threshold::Given(_) => USUAL_SIGMAS,
-    };
     let variance = known.amplitude.as_ref().map(|amplitude| {
         let response = harmonics::largest_response(plant, period, known.harmonics, amplitude);
-        let deviations = response.iter().zip(thresholds).map(|(r, t)| sigmas * r / t);
-        deviations.fold(0.0, f64::max).powi(2)
+        let openings = response.iter().zip(thresholds).map(|(r, t)| r / t);
+        (ROOM * openings.fold(0.0, f64::max)).powi(2)
     });
     Harmonics {
         period,

@@ -33,6 +33,38 @@ const USUAL_SIGMAS: f64 = 6.0;
 /// nothing, or hides just below its threshold, must not be taken for the disturbance.
 const QUIET: f64 = 0.5;
 
+/// How far a residual can be trusted.
+#[derive(Clone, Copy, Debug)]
+struct Trust {
+    /// By how much its threshold is widened: the prediction's deviation over that of the noise.
+    widening: f64,
+    /// Whether a residual within the widened threshold clears an accused sensor.
+    clears: bool,
+    /// Whether something may be learned from it.
+    teaches: bool,
+}
+
+impl Trust {
+    /// As much as a threshold assumes.
+    const FULL: Self = Self {
+        widening: 1.0,
+        clears: true,
+        teaches: true,
+    };
+
+    /// What a threshold is multiplied by. Where little is known, the wide threshold keeps a healthy
+    /// sensor from being accused, but an accused one is cleared by nothing less than the narrow one:
+    /// its residual goes on being followed, since an estimate that stood still would leave the loop
+    /// without feedback.
+    fn factor(&self, accused: bool) -> f64 {
+        if accused && !self.clears {
+            1.0
+        } else {
+            self.widening
+        }
+    }
+}
+
 /// One sample as the estimator sees it.
 #[derive(Clone, Copy, Debug)]
 pub struct Observation<'a> {
@@ -178,13 +210,13 @@ impl EstimatorState {
     /// Judges one sample, sensor by sensor.
     pub fn observe(&mut self, estimator: &Estimator, seen: &Observation<'_>) {
         self.history.regress(seen.u0);
-        let widening = match estimator.method {
+        let trust = match estimator.method {
             EstimatorMethod::Reference => self.predict(estimator, seen),
             EstimatorMethod::Sliding => self.slide(seen),
             EstimatorMethod::None => None,
         };
-        self.judged = widening.is_some();
-        let healthy = self.decide(estimator, seen, widening);
+        self.judged = trust.is_some();
+        let healthy = self.decide(estimator, seen, trust);
         let corrected = self.reconsider(estimator, seen);
         if healthy && !corrected {
             self.learn(estimator, seen.mode);
@@ -192,9 +224,9 @@ impl EstimatorState {
         self.hold = self.hold.saturating_sub(1);
     }
 
-    /// The reference window: leaves prediction and residual, and returns by how much to widen the
-    /// thresholds; nothing while the residual cannot be trusted.
-    fn predict(&mut self, estimator: &Estimator, seen: &Observation<'_>) -> Option<f64> {
+    /// The reference window: leaves prediction and residual, and returns how far to trust them;
+    /// nothing while the regressor mixes modes.
+    fn predict(&mut self, estimator: &Estimator, seen: &Observation<'_>) -> Option<Trust> {
         let predictor = estimator.predictors.get(seen.mode)?;
         kernel::affine(
             &mut self.prediction,
@@ -221,10 +253,13 @@ impl EstimatorState {
                 *residual = value - predicted;
             }
         }
-        // What was not learned cannot clear a fault that is declared.
-        let uncertain = spread > 1.0 + estimator.leverage_limit && self.flagged.contains(&true);
-        let trusted = self.hold == 0 && leverage <= estimator.leverage_limit && !uncertain;
-        trusted.then(|| libm::sqrt(spread))
+        let most = 1.0 + estimator.leverage_limit;
+        let trust = Trust {
+            widening: libm::sqrt(spread),
+            clears: spread <= most,
+            teaches: leverage <= estimator.leverage_limit,
+        };
+        (self.hold == 0).then_some(trust)
     }
 
     /// Takes a healthy sample in: the response to the disturbance first, the plant's own response
@@ -267,9 +302,10 @@ impl EstimatorState {
         if !recovery.watch(known, learned.regressor(), sensors) {
             return false;
         }
+        let settled = learned.is_settled(known);
         let mut corrected = false;
         for (sensor, &threshold) in seen.thresholds.iter().enumerate() {
-            if let Some(waves) = recovery.acquittal(sensor, threshold) {
+            if let Some(waves) = recovery.acquittal(sensor, threshold, settled) {
                 learned.replace(sensor, waves);
                 corrected = true;
             }
@@ -279,10 +315,10 @@ impl EstimatorState {
     }
 
     /// The sliding window as printed: leaves the residual; nothing until the window is full.
-    fn slide(&mut self, seen: &Observation<'_>) -> Option<f64> {
+    fn slide(&mut self, seen: &Observation<'_>) -> Option<Trust> {
         let window = self.window.as_mut().filter(|_| self.hold == 0)?;
         window.residual(self.history.regressor(), seen.y, &mut self.residual);
-        window.full().then_some(1.0)
+        window.full().then_some(Trust::FULL)
     }
 
     /// Remembers the input that acts over the coming sample (m).
@@ -290,15 +326,15 @@ impl EstimatorState {
         self.history.push(acting);
     }
 
-    /// Decides sensor by sensor; `widening` is absent when the residual means nothing now.
+    /// Decides sensor by sensor; `trust` is absent when the residual means nothing now.
     /// Returns whether the residual was judged and every sensor found healthy beyond suspicion.
     fn decide(
         &mut self,
         estimator: &Estimator,
         seen: &Observation<'_>,
-        widening: Option<f64>,
+        trust: Option<Trust>,
     ) -> bool {
-        let mut healthy = widening.is_some();
+        let mut healthy = trust.is_some_and(|trust| trust.teaches);
         let sensors = self
             .decisions
             .iter_mut()
@@ -315,7 +351,7 @@ impl EstimatorState {
             let verdict = if !is_measurement(value) {
                 Some(Verdict::Lost)
             } else {
-                widening.map(|factor| Verdict::of(residual, factor * threshold))
+                trust.map(|trust| Verdict::of(residual, trust.factor(*flagged) * threshold))
             };
             let Some(verdict) = verdict else { continue };
             decision.update(verdict, estimator.debounce);
@@ -325,7 +361,7 @@ impl EstimatorState {
                 (true, Verdict::Lost) => *fault,
                 (true, _) => residual.clamp(-largest, largest),
             };
-            let quiet = widening.is_some_and(|factor| residual.abs() <= QUIET * factor * threshold);
+            let quiet = trust.is_some_and(|t| residual.abs() <= QUIET * t.widening * threshold);
             healthy &= !*flagged && verdict == Verdict::Healthy && quiet;
         }
         healthy
