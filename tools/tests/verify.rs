@@ -21,6 +21,8 @@ const PLATFORMS: [&str; 2] = if cfg!(target_arch = "aarch64") {
 } else {
     ["linux64", "aarch64-linux"]
 };
+const HERE: &str = PLATFORMS[0];
+const ELSEWHERE: &str = PLATFORMS[1];
 
 /// A library for this machine that offers what an importer needs, and does nothing.
 fn library() -> &'static [u8] {
@@ -67,16 +69,11 @@ struct Exported {
 impl Exported {
     fn new(design: &str) -> Self {
         let bench = Bench::new(design);
-        let program = installed(
-            &bench,
-            &[
-                "fmu-binaries/linux64/ftc_controller.so",
-                "fmu-binaries/linux64/ftc_plant.so",
-            ],
-        );
+        let program = installed(&bench, &[]);
+        let folder = bench.path("bin/fmu-binaries").join(HERE);
+        fs::create_dir_all(&folder).unwrap();
         for kind in ["controller", "plant"] {
-            let path = bench.path(&format!("bin/fmu-binaries/linux64/ftc_{kind}.so"));
-            fs::write(path, library()).unwrap();
+            fs::write(folder.join(format!("ftc_{kind}.so")), library()).unwrap();
         }
         let output = export(&bench, &program, "out");
         assert!(
@@ -351,7 +348,9 @@ fn a_description_that_says_something_else() {
 
 #[test]
 fn binaries_that_are_none() {
-    let path = "binaries/linux64/sound_controller.so";
+    let at = |platform: &str, name: &str| format!("binaries/{platform}/{name}.so");
+    let path = at(HERE, "sound_controller");
+    let path = path.as_str();
     let with = |name: &str, bytes: Option<&[u8]>| {
         let mut exported = Exported::new(SOUND);
         let sound = exported.files.remove(path).unwrap();
@@ -364,19 +363,19 @@ fn binaries_that_are_none() {
         exported
     };
     with(path, None).refused("removed", 1, &["no binary"]);
-    with(path, Some(b"hello")).refused("text", 1, &[path, "is no library for linux64"]);
+    with(path, Some(b"hello")).refused("text", 1, &[path, &format!("is no library for {HERE}")]);
     let cut = &library()[..library().len() / 2];
     with(path, Some(cut)).refused("cut", 1, &[path]);
     let (last, most) = FUNCTIONS.split_last().unwrap();
     with(path, Some(&compiled(most))).refused("a function less", 1, &[path, last]);
-    let other = "binaries/aarch64-linux/sound_controller.so";
-    with(other, Some(library())).refused(
+    let other = at(ELSEWHERE, "sound_controller");
+    with(&other, Some(library())).refused(
         "another machine",
         1,
-        &[other, "is no library for aarch64-linux"],
+        &[&other, &format!("is no library for {ELSEWHERE}")],
     );
-    let stranger = "binaries/linux64/other.so";
-    with(stranger, Some(library())).refused("stranger", 1, &[stranger, "no part of this FMU"]);
+    let stranger = at(HERE, "other");
+    with(&stranger, Some(library())).refused("stranger", 1, &[&stranger, "no part of this FMU"]);
 }
 
 fn first_number(value: &mut Value) -> Option<&mut Value> {
