@@ -61,8 +61,6 @@ pub struct Report<'a> {
     pub residual: &'a [f64],
     /// Declared faults (p).
     pub flagged: &'a [bool],
-    /// Whether the residual was judged.
-    pub judged: bool,
 }
 
 /// Every signal of one sample.
@@ -96,9 +94,6 @@ pub struct Record {
     pub residual: Vec<f64>,
     /// Declared faults (p).
     pub flagged: Vec<bool>,
-    /// Whether the residual was judged: not just after a mode switch, nor where the input lies
-    /// outside what the healthy database spans.
-    pub judged: bool,
 }
 
 /// One run.
@@ -158,7 +153,6 @@ impl Regulator for Tolerant<'_> {
             fault: &estimator.fault,
             residual: &estimator.residual,
             flagged: &estimator.flagged,
-            judged: estimator.judged(),
         }
     }
 }
@@ -237,7 +231,6 @@ fn record(plant: &PlantState, regulator: &dyn Regulator) -> Record {
         f_hat: report.fault.to_vec(),
         residual: report.residual.to_vec(),
         flagged: report.flagged.to_vec(),
-        judged: report.judged,
     }
 }
 

@@ -7,7 +7,7 @@ use crate::design_file::sentence::shorten;
 use crate::design_file::values::NameOrList;
 use crate::healthy_log::file_of;
 use crate::report::text::number;
-use ftc::control::estimator::leverage;
+use ftc::control::estimator::{InputHistory, leverage};
 use ftc::control::parameters::{Estimator, EstimatorMethod, Predictor};
 use ftc::design::Design;
 use ftc::design::assembly::DatabaseSource;
@@ -234,7 +234,7 @@ fn outside_the_database(design: &Design) -> Vec<String> {
     let limit = controller.estimator.leverage_limit;
     let far = worst.iter().enumerate().filter_map(|(mode, worst)| {
         let (u, leverage) = worst.as_ref().filter(|(_, leverage)| *leverage > limit)?;
-        Some(beyond(design, mode, u, (leverage / limit).sqrt()))
+        Some(beyond(design, mode, u, (1.0 + leverage).sqrt()))
     });
     far.collect()
 }
@@ -248,11 +248,12 @@ fn beyond(design: &Design, mode: usize, u: &DVector<f64>, times: f64) -> String 
         .max_by(|a, b| farthest(a).total_cmp(&farthest(b)))
         .unwrap_or(0);
     format!(
-        "mode {}: the reference needs {} = {} in steady state, {times:.1} times beyond what the healthy database \
-         lets be judged, and no sensor is judged there: raise its nominal (signals.inputs), or log a run there",
+        "mode {}: the reference needs {} = {} in steady state, far outside what the healthy database spans, and \
+         thresholds open {} times there: raise its nominal (signals.inputs), or log a run there",
         mode + 1,
         inputs[input].name,
-        number(u[input])
+        number(u[input]),
+        number(times.round())
     )
 }
 
@@ -326,27 +327,16 @@ fn unexplained(deviation: f64, moved: f64) -> Option<String> {
     })
 }
 
-/// The share of a run in which no sensor was judged, and why.
+/// How much of a run the estimator spent without firm ground, and why.
 fn unjudged(design: &Design, run: &Trajectory) -> Vec<String> {
     let estimator = &design.controller.estimator;
-    if estimator.method == EstimatorMethod::None || run.records.is_empty() {
-        return Vec::new();
-    }
-    let (mut held, mut outside, mut since) = (0, 0, 0);
-    let mut before: Option<&Record> = None;
-    for record in &run.records {
-        let switched = before.is_some_and(|before| before.mode != record.mode);
-        since = if switched { 0 } else { since };
-        let holding = since < estimator.response_length;
-        held += usize::from(!record.judged && holding);
-        outside += usize::from(!record.judged && !holding);
-        since += 1;
-        before = Some(record);
-    }
-    let share = |count: usize| count as f64 / run.records.len() as f64;
+    let samples = run.records.len();
+    let share = |count: usize| count as f64 / samples.max(1) as f64;
     let percent = |count: usize| format!("{:.1} % of the samples", 100.0 * share(count));
+    let held = held(estimator, &run.records);
+    let far = Far::of(design, run);
     let mut warnings = Vec::new();
-    if share(held) > MANY {
+    if estimator.method != EstimatorMethod::None && share(held) > MANY {
         warnings.push(format!(
             "ftc: in {} no sensor was judged, since a mode had just been entered: an estimate is held for response_length \
              = {} samples then",
@@ -354,20 +344,61 @@ fn unjudged(design: &Design, run: &Trajectory) -> Vec<String> {
             estimator.response_length
         ));
     }
-    if share(outside) > FEW {
-        let reason = match estimator.method {
-            EstimatorMethod::Reference => {
-                "the inputs lay outside what the healthy database spans, or a sensor was accused before the disturbance \
-                 was learned: raise the inputs' nominal values, or log a run there"
-            }
-            _ => "the sliding window was not yet full",
-        };
+    if share(far.samples) > FEW {
         warnings.push(format!(
-            "ftc: in {} no sensor was judged, since {reason}",
-            percent(outside)
+            "ftc: in {} the inputs lay outside what the healthy database spans, and thresholds opened up to {} times: \
+             raise the inputs' nominal values, or log a run there",
+            percent(far.samples),
+            number(far.widening.round())
         ));
     }
     warnings
+}
+
+/// Samples after the start or a switch in which the regressor does not hold one mode only.
+fn held(estimator: &Estimator, records: &[Record]) -> usize {
+    let visits = records.chunk_by(|one, next| one.mode == next.mode);
+    visits
+        .map(|visit| visit.len().min(estimator.response_length))
+        .sum()
+}
+
+/// What of a run lay outside the healthy database.
+struct Far {
+    /// How many samples.
+    samples: usize,
+    /// The most by which it opened thresholds.
+    widening: f64,
+}
+
+impl Far {
+    /// Plays the inputs of a run once more.
+    fn of(design: &Design, run: &Trajectory) -> Self {
+        let controller = &design.controller;
+        let (estimator, modes) = (&controller.estimator, &controller.plant.modes);
+        let mut far = Self {
+            samples: 0,
+            widening: 1.0,
+        };
+        let Some(first) = run.records.first() else {
+            return far;
+        };
+        let start = &modes[first.mode].operating_point.u;
+        let mut history = InputHistory::new(start, estimator.response_length);
+        let mut before = start;
+        for record in &run.records {
+            if let Some(predictor) = estimator.predictors.get(record.mode) {
+                history.regress(&modes[record.mode].operating_point.u);
+                let leverage = history.leverage(&predictor.factor);
+                far.samples += usize::from(leverage > estimator.leverage_limit);
+                far.widening = far.widening.max((1.0 + leverage).sqrt());
+            }
+            let delayed = controller.feedback.latency > 0;
+            history.push(if delayed { before } else { &record.u });
+            before = &record.u;
+        }
+        far
+    }
 }
 
 /// A run that ended in equations without a solution.

@@ -117,7 +117,12 @@ fn a_reference_far_outside_the_database() {
         )
     };
     let far = Bench::new(design(1.0, 1000.0));
-    let words = ["mode 1", "valve = 1000 in steady state", "nominal"];
+    let words = [
+        "mode 1",
+        "valve = 1000 in steady state",
+        "nominal",
+        "thresholds open",
+    ];
     one(&of_design(&far), &words);
     let run = of_run(&far, &[]);
     assert_eq!(run.len(), 2, "{run:?}");

@@ -201,12 +201,6 @@ impl EstimatorState {
         estimator.method == EstimatorMethod::Reference && self.hold == 0
     }
 
-    /// Whether the last residual was judged: not for a while after a mode switch, nor where the
-    /// input lies outside what the healthy database spans.
-    pub fn judged(&self) -> bool {
-        self.judged
-    }
-
     /// Judges one sample, sensor by sensor.
     pub fn observe(&mut self, estimator: &Estimator, seen: &Observation<'_>) {
         self.history.regress(seen.u0);

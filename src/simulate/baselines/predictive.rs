@@ -173,7 +173,6 @@ impl Regulator for Predictive {
             fault: &self.silent,
             residual: self.offset.as_slice(),
             flagged: &self.calm,
-            judged: false,
         }
     }
 
