@@ -78,10 +78,17 @@ impl Staging {
         }
         let aside = self.folder().join(ASIDE);
         fs::create_dir(&aside).map_err(|error| blame(&self.out, &error))?;
+        self.exchange(&names, &aside)?;
+        self.made.clear();
+        Ok(names.iter().map(|name| self.out.join(name)).collect())
+    }
+
+    /// Puts all files into place, or none.
+    fn exchange(&self, names: &[OsString], aside: &Path) -> Result<(), String> {
         for (done, name) in names.iter().enumerate() {
-            if let Err(error) = self.swap(name, &aside) {
+            if let Err(error) = self.swap(name, aside) {
                 for name in names[..=done].iter().rev() {
-                    self.swap_back(name, &aside);
+                    self.swap_back(name, aside);
                 }
                 return Err(format!(
                     "--out {}: {} cannot be written ({error}): name another directory",
@@ -90,8 +97,7 @@ impl Staging {
                 ));
             }
         }
-        self.made.clear();
-        Ok(names.iter().map(|name| self.out.join(name)).collect())
+        Ok(())
     }
 
     /// The files collected, in alphabetical order.
@@ -161,5 +167,34 @@ impl Drop for Staging {
 fn remove(directories: &[PathBuf]) {
     for path in directories {
         fs::remove_dir(path).ok();
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_was_moved_is_taken_back_where_another_cannot_be() {
+        let root = TempDir::new().unwrap();
+        let out = root.path();
+        fs::write(out.join("a"), "old a").unwrap();
+        fs::write(out.join("c"), "old c").unwrap();
+        let staging = Staging::new(out).unwrap();
+        for name in ["a", "b", "c"] {
+            staging.add(name, b"new").unwrap();
+        }
+        let names = staging.names().unwrap();
+        // The old c cannot be put aside: a directory bears its name there.
+        let aside = TempDir::new_in(out).unwrap();
+        fs::create_dir(aside.path().join("c")).unwrap();
+        let message = staging.exchange(&names, aside.path()).unwrap_err();
+        assert!(message.contains(": c cannot be written"), "{message}");
+        assert_eq!(fs::read_to_string(out.join("a")).unwrap(), "old a");
+        assert!(!out.join("b").exists());
+        assert_eq!(fs::read_to_string(out.join("c")).unwrap(), "old c");
+        let paths = staging.commit().unwrap();
+        assert_eq!(paths.len(), 3);
+        assert_eq!(fs::read_to_string(out.join("c")).unwrap(), "new");
     }
 }
