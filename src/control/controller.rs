@@ -9,6 +9,7 @@ use super::estimator::{EstimatorState, Observation};
 use super::integrator;
 use super::kernel;
 use super::observer::{ObservedMode, ObserverState};
+use super::open_loop::OpenLoop;
 use super::parameters::{Compensation, ControllerParameters, FeedbackGains, Limits};
 use super::repetition::Repetition;
 use crate::plant::OperatingPoint;
@@ -59,6 +60,8 @@ pub struct ControllerState {
     repetition: Repetition,
     /// State observer.
     pub observer: ObserverState,
+    /// The model's own run while no reading can be judged.
+    open_loop: OpenLoop,
     /// Fault estimator.
     pub estimator: EstimatorState,
     /// Integrator state `Z` and resonators (q).
@@ -83,8 +86,8 @@ pub struct ControllerState {
 
 crate::state::state!(ControllerState {
     parts: [
-        repetition, observer, estimator, integral, additive, command, corrected, acting, deviation,
-        excess, substitute, no_fault
+        repetition, observer, open_loop, estimator, integral, additive, command, corrected, acting,
+        deviation, excess, substitute, no_fault
     ],
     constants: [],
     counters: [mode]
@@ -122,6 +125,7 @@ impl Controller {
             mode: None,
             repetition: Repetition::new(dims.outputs),
             observer: ObserverState::new(&point.x, dims.outputs),
+            open_loop: OpenLoop::new(&point.x, dims.outputs),
             estimator: EstimatorState::new(&self.parameters.estimator, &point.u, dims.outputs),
             integral: vec![0.0; self.parameters.feedback.integral_size()],
             additive: (self.parameters.compensation == Compensation::Additive)
@@ -216,6 +220,15 @@ impl Controller {
             fault,
             &state.substitute,
         );
+        if sample.compensate == Compensate::Estimate
+            && state.estimator.holds(&self.parameters.estimator)
+        {
+            let accused = &state.estimator.flagged;
+            let (thresholds, corrected) = (sample.thresholds, &mut state.corrected);
+            state
+                .open_loop
+                .overrule(model, accused, thresholds, corrected);
+        }
         kernel::bound(&mut state.corrected);
     }
 
@@ -316,6 +329,11 @@ impl Controller {
             state
                 .observer
                 .predict(&gain.0, model, &state.acting, &state.corrected);
+        }
+        if state.estimator.holds(&self.parameters.estimator) {
+            state.open_loop.advance(model, &state.acting);
+        } else {
+            state.open_loop.restart(state.observer.predicted());
         }
         if let Some(gains) = feedback.modes.get(mode) {
             integrator::advance(

@@ -15,6 +15,7 @@ pub mod estimator;
 pub mod integrator;
 pub mod kernel;
 pub mod observer;
+pub mod open_loop;
 pub mod parameters;
 pub mod repetition;
 

@@ -61,6 +61,11 @@ impl ObserverState {
         }
     }
 
+    /// The state predicted for the next measurement (n).
+    pub fn predicted(&self) -> &[f64] {
+        &self.prior
+    }
+
     /// The output this observer expects now (p), before any measurement.
     pub fn expected_output(&self, mode: &ObservedMode, out: &mut [f64]) {
         kernel::affine(out, &mode.output_offset, &mode.c, &self.prior);

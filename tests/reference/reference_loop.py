@@ -92,6 +92,19 @@ def disturbance_response(mode: record.Mode, angle: float) -> np.ndarray:
 
 
 @dataclass
+class Trust:
+    """How much a residual says: by how much thresholds widen, whether it clears, whether it teaches."""
+
+    widening: float
+    clears: bool
+    teaches: bool
+
+    def factor(self, *, accused: bool) -> float:
+        """Returns what a threshold is multiplied by."""
+        return 1.0 if accused and not self.clears else self.widening
+
+
+@dataclass
 class FaultFlag:
     """A flag that yields only to `debounce` contradicting samples in a row."""
 
@@ -144,6 +157,7 @@ class Estimator:
         self.y_hat = np.zeros(self.outputs)
         self.residual = np.zeros(self.outputs)
         self.f_hat = np.zeros(self.outputs)
+        self.judging = False
 
     @property
     def predicting(self) -> bool:
@@ -172,7 +186,7 @@ class Estimator:
         """Predicts the output, takes the residual, decides sensor by sensor and learns when all are healthy."""
         present = np.isfinite(y)
         if not self.enabled:
-            self._decide(present, trusted=False, widening=1.0)
+            self._decide(present, trust=None)
             return
         phi = np.concatenate([u - self.modes[mode].u0 for u in self.past[-self.length :]])
         undisturbed = self.modes[mode].y0 + self.responses[mode] @ phi
@@ -184,9 +198,9 @@ class Estimator:
             spread += self.fits[mode].leverage(h)
         self.residual = np.where(present, y - self.y_hat, self.residual)
         limit = self.settings["leverage_limit"]
-        unsure = spread > 1.0 + limit and any(flag.up for flag in self.flags)
-        trusted = self.hold == 0 and distance <= limit and not unsure
-        healthy = self._decide(present, trusted=trusted, widening=math.sqrt(spread))
+        self.judging = self.hold == 0
+        trust = Trust(math.sqrt(spread), clears=spread <= 1.0 + limit, teaches=distance <= limit)
+        healthy = self._decide(present, trust=trust if self.judging else None)
         if self.fits:
             corrected = self._reconsider(mode, h, y - undisturbed)
             if healthy and not corrected:
@@ -205,27 +219,30 @@ class Estimator:
         self.period_seen.clear()
         fit = np.linalg.solve(X.T @ X + 1e-6 * np.eye(X.shape[1]), X.T @ D)
         limits = 0.5 * np.array(self.settings["thresholds"])
-        small = (np.abs(fit[0]) <= limits) & (np.mean((D - X @ fit) ** 2, axis=0) <= limits**2)
-        cleared = np.flatnonzero(small & up.any(axis=0))
+        unbiased = (np.abs(fit[0]) <= limits) | (self.fits[mode].samples < self.settings["harmonics"]["period"])
+        explained = np.mean((D - X @ fit) ** 2, axis=0) <= limits**2
+        cleared = np.flatnonzero(unbiased & explained & up.any(axis=0))
         for sensor in cleared:
             self.fits[mode].replace(sensor, fit[1:, sensor])
         return cleared.size > 0
 
-    def _decide(self, present: np.ndarray, *, trusted: bool, widening: float) -> bool:
+    def _decide(self, present: np.ndarray, *, trust: Trust | None) -> bool:
         """Votes on each sensor's flag and sets f_hat; says whether every sensor was judged and found healthy."""
-        all_well = trusted and bool(present.all())
+        all_well = trust is not None and trust.teaches and bool(present.all())
         for i, flag in enumerate(self.flags):
-            if present[i] and not trusted:
+            if present[i] and trust is None:
                 continue
-            beyond = abs(self.residual[i]) > widening * self.settings["thresholds"][i]
+            threshold = self.settings["thresholds"][i]
+            factor = trust.factor(accused=flag.up) if trust else 1.0
+            beyond = abs(self.residual[i]) > factor * threshold
             flag.vote(faulty=bool(beyond or not present[i]), lost=not present[i])
             largest = self.settings["largest_fault"][i]
             if not flag.up:
                 self.f_hat[i] = 0.0
             elif present[i]:
                 self.f_hat[i] = np.clip(self.residual[i], -largest, largest)
-            quiet = abs(self.residual[i]) <= 0.5 * widening * self.settings["thresholds"][i]
-            all_well = all_well and not flag.up and quiet
+            quiet = trust is not None and abs(self.residual[i]) <= 0.5 * trust.widening * threshold
+            all_well = all_well and not flag.up and quiet and not beyond
         return all_well
 
 
@@ -353,6 +370,7 @@ class Loop:
         sensors = scenario.Sensors(self.design["scenario"]["events"], self.true_modes[mode].y0.copy())
         internal = InternalModel(self.design)
         x, u, Z = self.true_modes[mode].x0, start.u0, np.zeros(len(internal.M))
+        model_run = start.x0
         estimator.past = [u] * estimator.length
         rows: dict[str, list] = {}
         for tick in range(self.design["scenario"]["steps"]):
@@ -370,6 +388,11 @@ class Loop:
             fault = self.trusted_fault(variant, estimator.f_hat, sensors.fault)
             believed = heard if variant == "ftc" else y
             y_c = np.where(np.isfinite(believed), believed - fault, substitute)
+            holding = estimator.enabled and not estimator.judging
+            if variant == "ftc" and holding:
+                modelled = self.modes[mode].C @ model_run + self.modes[mode].c
+                far = np.abs(y_c - modelled) > 4.0 * np.array(estimator.settings["thresholds"])
+                y_c = np.where([flag.up for flag in estimator.flags] & far, modelled, y_c)
             observer.correct(mode, y_c)
             if mode != left and feedback["bumpless"]:
                 G = np.array(feedback["modes"][mode]["integral"])
@@ -381,6 +404,8 @@ class Loop:
             unwinding = np.array(feedback["modes"][mode]["anti_windup"])
             Z = internal.M @ Z + internal.N @ (te * (y_ref - y_c[feedback["tracked"]])) + unwinding @ (u - wanted)
             observer.advance(mode, acting, y_c)
+            here = self.modes[mode]
+            model_run = here.A @ model_run + here.B @ acting + here.a if holding else observer.prior
             estimator.past.append(acting)
             for name, value in {
                 "mode": [mode + 1],

@@ -61,9 +61,17 @@ impl Controller {
             && self.parameters.compensation == Compensation::VirtualSensor;
         let believed = readings(&trial.repetition, sample);
         let changes = trial.estimator.fault.iter().zip(believed).zip(dy);
-        for (corrected, ((&fault, &y), &dy)) in trial.corrected.iter_mut().zip(changes) {
+        let readings = trial
+            .corrected
+            .iter_mut()
+            .zip(trial.open_loop.contradicted());
+        for ((corrected, &overruled), ((&fault, &y), &dy)) in readings.zip(changes) {
             let change = if subtracted { dy - fault } else { dy };
-            let seen = if is_measurement(y) { change } else { 0.0 };
+            let seen = if is_measurement(y) && !overruled {
+                change
+            } else {
+                0.0
+            };
             *corrected = kernel::bounded_change(*corrected, seen);
         }
     }

@@ -201,6 +201,11 @@ impl EstimatorState {
         estimator.method == EstimatorMethod::Reference && self.hold == 0
     }
 
+    /// Whether the last sample could not be judged, so that estimates stand still.
+    pub fn holds(&self, estimator: &Estimator) -> bool {
+        estimator.method == EstimatorMethod::Reference && !self.judged
+    }
+
     /// Judges one sample, sensor by sensor.
     pub fn observe(&mut self, estimator: &Estimator, seen: &Observation<'_>) {
         self.history.regress(seen.u0);

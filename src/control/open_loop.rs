@@ -1,0 +1,85 @@
+//! What the model alone says since the last mode switch, and whom it contradicts.
+//!
+//! While the regressor mixes modes no residual means anything, and an accused sensor is corrected by
+//! the last estimate of its fault. That is right for a bias. A sensor that is stuck, or whose fault
+//! comes or goes just then, would leave the loop without feedback: where the corrected reading and
+//! the model run from the switch on drift far apart, the model is believed.
+
+use super::kernel;
+use super::observer::ObservedMode;
+use serde::{Deserialize, Serialize};
+
+/// How many thresholds reading and model may differ: the run knows neither the disturbance nor what
+/// the model misses.
+const TOLERANCE: f64 = 4.0;
+
+/// The model's run, and the sensors it contradicts.
+#[derive(Debug, PartialEq, Serialize, Deserialize)]
+pub struct OpenLoop {
+    /// State predicted without any measurement since the switch (n).
+    state: Vec<f64>,
+    /// The next state, while it is computed (n).
+    next: Vec<f64>,
+    /// Its output (p).
+    output: Vec<f64>,
+    /// Which sensors are contradicted now (p).
+    contradicted: Vec<bool>,
+}
+
+crate::state::state!(OpenLoop {
+    parts: [state, next, output, contradicted],
+    constants: [],
+    counters: []
+});
+
+impl OpenLoop {
+    /// At state `x0` (n) with `outputs` sensors.
+    pub fn new(x0: &[f64], outputs: usize) -> Self {
+        Self {
+            state: x0.to_vec(),
+            next: x0.to_vec(),
+            output: vec![0.0; outputs],
+            contradicted: vec![false; outputs],
+        }
+    }
+
+    /// While readings can be judged: starts anew from the observer's prediction of the next state (n).
+    pub fn restart(&mut self, predicted: &[f64]) {
+        kernel::copy(&mut self.state, predicted);
+        self.contradicted.fill(false);
+    }
+
+    /// Predicts one sample on under the acting input `u` (m).
+    pub fn advance(&mut self, mode: &ObservedMode, u: &[f64]) {
+        kernel::affine(&mut self.next, &mode.state_offset, &mode.a, &self.state);
+        kernel::add_product(&mut self.next, &mode.b, u);
+        kernel::bound(&mut self.next);
+        kernel::copy(&mut self.state, &self.next);
+    }
+
+    /// Replaces the `corrected` readings (p) of accused sensors that differ from the model's by more
+    /// than their `thresholds` (p) allow.
+    pub fn overrule(
+        &mut self,
+        mode: &ObservedMode,
+        accused: &[bool],
+        thresholds: &[f64],
+        corrected: &mut [f64],
+    ) {
+        kernel::affine(&mut self.output, &mode.output_offset, &mode.c, &self.state);
+        let sensors = accused.iter().zip(thresholds).zip(&self.output);
+        let readings = corrected.iter_mut().zip(&mut self.contradicted);
+        for ((reading, contradicted), ((&accused, &threshold), &expected)) in readings.zip(sensors)
+        {
+            *contradicted = accused && (*reading - expected).abs() > TOLERANCE * threshold;
+            if *contradicted {
+                *reading = expected;
+            }
+        }
+    }
+
+    /// Which sensors were contradicted at this tick (p).
+    pub fn contradicted(&self) -> &[bool] {
+        &self.contradicted
+    }
+}
