@@ -338,8 +338,8 @@ fn unjudged(design: &Design, run: &Trajectory) -> Vec<String> {
     let mut warnings = Vec::new();
     if estimator.method != EstimatorMethod::None && share(held) > MANY {
         warnings.push(format!(
-            "ftc: in {} no sensor was judged, since a mode had just been entered: an estimate is held for response_length \
-             = {} samples then",
+            "ftc: in {} no sensor was judged, since a mode had just been entered: for response_length = {} \
+             samples then no fault is found or cleared",
             percent(held),
             estimator.response_length
         ));
