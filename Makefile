@@ -7,7 +7,11 @@ IN_VENV := $(VENV)/bin/
 
 ZIG := target/platforms/zig
 
-.PHONY: build fmu-linux64 fmu-all compare-platforms test test-rust test-python demo bench fuzz soak memcheck lint clean
+# Which cargo-fuzz; it is compiled into this folder, not installed.
+FUZZER := cargo-fuzz@0.13.1
+TOOLS := $(CURDIR)/target/tools
+
+.PHONY: build fmu-linux64 fmu-all compare-platforms test test-rust test-python demo bench fuzz soak memcheck threadcheck lint clean
 
 # The FMU binaries are made by themselves, with the profile meant for them: built with the whole
 # workspace they would carry the solver's symbols along.
@@ -41,8 +45,9 @@ test: lint test-rust test-python
 test-rust: build
 	cargo test --release --workspace
 
+# PYTEST may hold options, such as --nothing-skipped.
 test-python: build $(VENV)/ready
-	$(IN_VENV)python -m pytest
+	$(IN_VENV)python -m pytest $(PYTEST)
 
 demo: build $(VENV)/ready
 	PYTHONPATH=tests/support $(IN_VENV)python tests/fmpy/demo.py examples/paper.toml out/demo
@@ -50,22 +55,35 @@ demo: build $(VENV)/ready
 bench: build
 	cargo bench --workspace
 
-# Fuzzing needs cargo-fuzz and a C++ compiler; SECONDS and TARGETS may be set.
+# Fuzzing needs a C++ compiler; each of TARGETS runs for SECONDS, ABREAST of them side by side.
 SECONDS ?= 30
 TARGETS ?= controller_calls plant_calls controller_design plant_design state location
+ABREAST ?= 1
+FUZZ := RUSTC_BOOTSTRAP=1 PATH="$(TOOLS)/bin:$$PATH" cargo fuzz
+IN_FUZZ := --fuzz-dir fmu/fuzz --target-dir target/fuzz
 
-fuzz:
-	cd fmu/fuzz && for target in $(TARGETS); do RUSTC_BOOTSTRAP=1 \
-		cargo fuzz run --fuzz-dir . $$target -- -max_total_time=$(SECONDS) -rss_limit_mb=4096 || exit 1; done
+fuzz: $(TOOLS)/$(FUZZER)
+	$(FUZZ) build $(IN_FUZZ)
+	printf '%s\n' $(TARGETS) | xargs -P $(ABREAST) -I TARGET sh -c '$(FUZZ) run $(IN_FUZZ) TARGET -- \
+		-max_total_time=$(SECONDS) -rss_limit_mb=4096 -print_final_stats=1'
+
+$(TOOLS)/$(FUZZER):
+	cargo install --quiet --locked --root $(TOOLS) $(FUZZER)
+	touch $@
 
 TICKS ?= 100000000
 
 soak:
 	cargo run --release --package fmu-host --example soak -- $(TICKS)
 
-# valgrind's memcheck over the C program of tests/c on both FMUs.
+# valgrind over the C programs of tests/c on both FMUs: its memcheck on one instance and its twin,
+# its two checkers of threads on eight threads with two loops each.
 memcheck: build $(VENV)/ready
-	PYTHONPATH=tests/support $(IN_VENV)python tests/support/c_host.py examples/paper.toml
+	PYTHONPATH=tests/support $(IN_VENV)python tests/support/c_host.py memcheck examples/paper.toml
+
+threadcheck: build $(VENV)/ready
+	PYTHONPATH=tests/support $(IN_VENV)python tests/support/c_host.py helgrind examples/paper.toml
+	PYTHONPATH=tests/support $(IN_VENV)python tests/support/c_host.py drd examples/paper.toml
 
 lint: $(VENV)/ready
 	cargo fmt --all --check

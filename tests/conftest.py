@@ -27,6 +27,19 @@ class Case:
     run: commands.Run
 
 
+def pytest_addoption(parser: pytest.Parser) -> None:
+    """Adds the option under which continuous integration runs."""
+    parser.addoption("--nothing-skipped", action="store_true", help="a skipped test is an error")
+
+
+@pytest.hookimpl(trylast=True)
+def pytest_sessionfinish(session: pytest.Session) -> None:
+    """Ends with an error if a test was skipped and none may be."""
+    reporter = session.config.pluginmanager.get_plugin("terminalreporter")
+    if session.config.getoption("nothing_skipped") and reporter.stats.get("skipped"):
+        session.exitstatus = pytest.ExitCode.TESTS_FAILED
+
+
 def pytest_sessionstart() -> None:
     """Refuses to start without the program under test."""
     if not commands.PROGRAM.exists():

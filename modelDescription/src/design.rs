@@ -1,7 +1,21 @@
-//! What the tables need of a design.
+//! The design as an FMU carries it, and what the tables need of it.
 
 use crate::{Interface, SignalInfo};
 use ftc::design::{Design, Signal};
+
+/// Name of the design in an FMU's `resources` folder.
+pub const DESIGN_FILE: &str = "design.json";
+
+/// Reads the bytes of [`DESIGN_FILE`] and checks that all sizes agree.
+///
+/// # Errors
+/// One sentence that names the file and what is wrong in it.
+pub fn read_design(bytes: &[u8]) -> Result<Design, String> {
+    let in_file = |why: &dyn std::fmt::Display| format!("{DESIGN_FILE}: {why}");
+    let design: Design = serde_json::from_slice(bytes).map_err(|why| in_file(&why))?;
+    design.check().map_err(|why| in_file(&why))?;
+    Ok(design)
+}
 
 impl From<&Design> for Interface {
     fn from(design: &Design) -> Self {

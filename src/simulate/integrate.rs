@@ -99,7 +99,7 @@ fn attempt<const N: usize>(
     tolerance: Tolerance,
     derivative: &impl Fn(&[f64; N]) -> [f64; N],
 ) -> ([f64; N], f64) {
-    let mut slopes = [[0.0; N]; 7];
+    let mut slopes = [[0.0; N]; STAGES.len() + 1];
     slopes[0] = derivative(state);
     let mut point = *state;
     for (stage, weights) in STAGES.iter().enumerate() {
@@ -111,13 +111,14 @@ fn attempt<const N: usize>(
         }
         slopes[stage + 1] = derivative(&point);
     }
+    let mut estimates = [0.0; N];
+    for (slope, weight) in slopes.iter().zip(&ERROR) {
+        for (estimate, rate) in estimates.iter_mut().zip(slope) {
+            *estimate += weight * rate;
+        }
+    }
     let mut worst: f64 = 0.0;
-    for (index, (&old, &new)) in state.iter().zip(&point).enumerate() {
-        let estimate: f64 = slopes
-            .iter()
-            .zip(&ERROR)
-            .map(|(slope, weight)| weight * slope[index])
-            .sum();
+    for ((&old, &new), estimate) in state.iter().zip(&point).zip(estimates) {
         let allowed = tolerance.absolute + tolerance.relative * old.abs().max(new.abs());
         let error = (step * estimate).abs() / allowed;
         worst = worst.max(if error.is_nan() { f64::INFINITY } else { error });

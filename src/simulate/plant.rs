@@ -6,10 +6,10 @@ pub use derivative::Change;
 
 use super::integrate::Stalled;
 use super::noise;
-use super::scenario::Scenario;
+use super::scenario::{FaultEvent, Scenario};
 use super::truth::{self, Truth};
 use crate::control::kernel;
-use crate::plant::SwitchedPlant;
+use crate::plant::{Mode, SwitchedPlant};
 use crate::state::State;
 use serde::{Deserialize, Serialize};
 
@@ -19,10 +19,16 @@ pub struct PlantSimulator {
     plant: SwitchedPlant,
     truth: Truth,
     scenario: Scenario,
-    /// `x0 - A x0 - B u0` per mode (n).
-    state_offsets: Vec<Vec<f64>>,
-    /// `y0 - C x0` per mode (p).
-    output_offsets: Vec<Vec<f64>>,
+    offsets: Vec<Offsets>,
+}
+
+/// The affine terms of one mode.
+#[derive(Clone, Debug)]
+struct Offsets {
+    /// `x0 - A x0 - B u0` (n).
+    state: Vec<f64>,
+    /// `y0 - C x0` (p).
+    output: Vec<f64>,
 }
 
 /// Signals added from outside, or in place of the scenario.
@@ -91,22 +97,15 @@ impl PlantSimulator {
     pub fn with_truth(designed: SwitchedPlant, truth: Truth, scenario: Scenario) -> Self {
         let plant = truth.linear(&designed).clone();
         let collect = |v: nalgebra::DVector<f64>| v.iter().copied().collect::<Vec<f64>>();
-        let state_offsets = plant
-            .modes
-            .iter()
-            .map(|mode| collect(mode.state_offset()))
-            .collect();
-        let output_offsets = plant
-            .modes
-            .iter()
-            .map(|mode| collect(mode.output_offset()))
-            .collect();
+        let offsets = plant.modes.iter().map(|mode| Offsets {
+            state: collect(mode.state_offset()),
+            output: collect(mode.output_offset()),
+        });
         Self {
+            offsets: offsets.collect(),
             plant,
             truth,
             scenario,
-            state_offsets,
-            output_offsets,
         }
     }
 
@@ -120,12 +119,20 @@ impl PlantSimulator {
         &self.scenario
     }
 
+    /// The mode (0-based) in which the scenario begins.
+    pub fn first_mode(&self) -> usize {
+        self.scenario.mode(0, self.plant.sample_time)
+    }
+
     /// At rest in the scenario's first mode, tick 0, outputs not yet observed.
     pub fn initial_state(&self) -> PlantState {
-        self.initial_state_in(self.scenario.mode(0, self.plant.sample_time))
+        self.initial_state_in(self.first_mode())
     }
 
     /// At rest at the operating point of `mode` (0-based), tick 0, outputs not yet observed.
+    ///
+    /// # Panics
+    /// There is no such mode.
     pub fn initial_state_in(&self, mode: usize) -> PlantState {
         let dims = self.plant.dimensions();
         let point = &self.plant.modes[mode].operating_point;
@@ -156,6 +163,9 @@ impl PlantSimulator {
         let scenario = &self.scenario;
         let built_in = external.mode.is_none();
         state.mode = self.active_mode(external, tick);
+        let Some((mode, offsets)) = self.described(state.mode) else {
+            return;
+        };
         let value =
             |signal: &super::scenario::Waveform| if built_in { signal.at(tick, te) } else { 0.0 };
         for (out, signal) in state.reference.iter_mut().zip(&scenario.reference) {
@@ -178,13 +188,7 @@ impl PlantSimulator {
             *out = value(signal) + added;
         }
         self.draw_noise(state, external.noise);
-        let mode = &self.plant.modes[state.mode];
-        kernel::affine(
-            &mut state.y_true,
-            &self.output_offsets[state.mode],
-            &mode.c,
-            &state.x,
-        );
+        kernel::affine(&mut state.y_true, &offsets.output, &mode.c, &state.x);
         kernel::add_product(&mut state.y_true, &mode.f, &state.disturbance);
         self.read_sensors(state, built_in);
     }
@@ -194,7 +198,12 @@ impl PlantSimulator {
         external
             .mode
             .unwrap_or_else(|| self.scenario.mode(tick, self.plant.sample_time))
-            .min(self.plant.modes.len() - 1)
+            .min(self.plant.modes.len().saturating_sub(1))
+    }
+
+    /// The matrices and offsets of a mode (0-based), if there is such a mode.
+    fn described(&self, mode: usize) -> Option<(&Mode, &Offsets)> {
+        self.plant.modes.get(mode).zip(self.offsets.get(mode))
     }
 
     /// Moves to the next tick under input `u` (m), held over the sample.
@@ -223,13 +232,10 @@ impl PlantSimulator {
     }
 
     fn advance_linear(&self, state: &mut PlantState, u: &[f64]) {
-        let mode = &self.plant.modes[state.mode];
-        kernel::affine(
-            &mut state.next,
-            &self.state_offsets[state.mode],
-            &mode.a,
-            &state.x,
-        );
+        let Some((mode, offsets)) = self.described(state.mode) else {
+            return;
+        };
+        kernel::affine(&mut state.next, &offsets.state, &mode.a, &state.x);
         kernel::add_product(&mut state.next, &mode.b, u);
         kernel::add_product(&mut state.next, &mode.e, &state.disturbance);
         kernel::copy(&mut state.x, &state.next);
@@ -252,29 +258,106 @@ impl PlantSimulator {
     /// `y = y_true + f + noise`, unless an event replaces the reading.
     fn read_sensors(&self, state: &mut PlantState, events: bool) {
         let (tick, te) = (state.tick, self.plant.sample_time);
-        for sensor in 0..state.y.len() {
-            let healthy = state.y_true[sensor] + state.noise[sensor];
-            let mut reading = healthy + state.fault[sensor];
+        let clean = state.y_true.iter().zip(&state.noise);
+        let read = state
+            .y
+            .iter_mut()
+            .zip(&mut state.fault)
+            .zip(&mut state.last);
+        for (sensor, (((y, fault), last), (truth, noise))) in read.zip(clean).enumerate() {
+            let healthy = truth + noise;
+            let mut reading = healthy + *fault;
             let mut struck = false;
-            for event in self
-                .scenario
-                .events
-                .iter()
-                .filter(|e| events && e.sensor == sensor && e.active(tick, te))
-            {
-                reading = event.reading(reading, state.last[sensor], tick, te);
+            for event in self.striking(sensor, tick, events) {
+                reading = event.reading(reading, *last, tick, te);
                 struck = true;
             }
-            if struck {
-                state.fault[sensor] = if reading.is_finite() {
-                    reading - healthy
-                } else {
-                    0.0
-                };
+            if !struck {
+                *last = reading;
+            } else if reading.is_finite() {
+                *fault = reading - healthy;
             } else {
-                state.last[sensor] = reading;
+                *fault = 0.0;
             }
-            state.y[sensor] = reading;
+            *y = reading;
+        }
+    }
+
+    /// The events present at a sensor (0-based) at `tick`; none where `events` are off.
+    fn striking(
+        &self,
+        sensor: usize,
+        tick: u64,
+        events: bool,
+    ) -> impl Iterator<Item = &FaultEvent> {
+        let te = self.plant.sample_time;
+        let all = self.scenario.events.iter();
+        all.filter(move |event| events && event.sensor == sensor && event.active(tick, te))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::plant::OperatingPoint;
+    use crate::simulate::scenario::{FaultKind, ModeInterval, Waveform};
+    use nalgebra::dmatrix;
+    use proptest::prelude::*;
+
+    /// Two states, one input, two outputs, one disturbance; an event on either sensor.
+    fn simulator() -> PlantSimulator {
+        let mode = Mode {
+            name: "only".into(),
+            a: dmatrix![0.5, 0.1; 0.0, 0.4],
+            b: dmatrix![1.0; 0.5],
+            c: dmatrix![1.0, 0.0; 0.0, 1.0],
+            e: dmatrix![1.0; 1.0],
+            f: dmatrix![0.0; 0.5],
+            operating_point: OperatingPoint::zero(2, 1, 2),
+        };
+        let event = |sensor, kind| FaultEvent {
+            sensor,
+            from: 0.0,
+            until: 9.0,
+            kind,
+        };
+        let plant = SwitchedPlant {
+            sample_time: 1.0,
+            modes: vec![mode],
+        };
+        let scenario = Scenario {
+            steps: 9,
+            noise: vec![0.1; 2],
+            seed: 1,
+            schedule: vec![ModeInterval { from: 0.0, mode: 0 }],
+            reference: vec![Waveform::ZERO],
+            fault: vec![Waveform::ZERO; 2],
+            events: vec![event(0, FaultKind::Stuck), event(1, FaultKind::Dropout)],
+            disturbance: vec![Waveform::ZERO],
+        };
+        PlantSimulator::new(plant, scenario)
+    }
+
+    proptest! {
+        /// What comes as bytes is compared with the plant's sizes; a tick must not rely on it.
+        #[test]
+        fn no_step_panics_whatever_the_sizes(
+            sizes in prop::array::uniform9(0usize..4), mode in 0usize..3,
+            given in prop::option::of(0usize..3), [m, p, s] in prop::array::uniform3(0usize..4),
+        ) {
+            let simulator = simulator();
+            let [x, y, y_true, fault, disturbance, reference, noise, last, next] = sizes.map(|size| vec![1.0; size]);
+            let mut state = PlantState { tick: 3, mode, x, y, y_true, fault, disturbance, reference, noise, last, next };
+            let (u, f, w) = (vec![1.0; m], vec![1.0; p], vec![1.0; s]);
+            let external = External { fault: &f, disturbance: &w, mode: given, noise: true };
+            simulator.advance(&mut state, &u).unwrap();
+            let mut trial = state.clone();
+            let change = Change { command: &u, fault: &f, disturbance: &w };
+            simulator.differentiate_outputs(&mut trial, &external, &change);
+            trial.mode = mode;
+            simulator.differentiate_tick(&mut trial, &external, &u, &change);
+            simulator.observe(&mut state, &external);
+            simulator.advance(&mut state, &u).unwrap();
         }
     }
 }

@@ -1,6 +1,7 @@
 //! What the simulated plant really is, as opposed to what the controller was designed for.
 
 use super::integrate::{self, Stalled, Tolerance};
+use crate::control::kernel;
 use crate::plant::SwitchedPlant;
 use crate::plant::rectifier::Rectifier;
 use serde::{Deserialize, Serialize};
@@ -57,7 +58,7 @@ pub(super) fn advance_rectifier(
     let result = integrate::advance(&mut state, sample_time, ACCURACY, |x| {
         rectifier.derivative(mode, x, [u_d, u_q], load_current)
     });
-    x.copy_from_slice(&state);
+    kernel::copy(x, &state);
     result
 }
 
@@ -86,11 +87,17 @@ pub(super) fn differentiate_rectifier(
     };
     let [w, dw] = held.disturbance.map(|w| w.first().copied().unwrap_or(0.0));
     let mut both = [i_d, i_q, v, 0.0, 0.0, 0.0];
-    let _ = integrate::advance(&mut both, sample_time, ACCURACY, |z| {
-        let (x, dx) = ([z[0], z[1], z[2]], [z[3], z[4], z[5]]);
-        let rate = rectifier.derivative(mode, &x, [u_d, u_q], w);
-        let change = rectifier.differential(mode, (&x, [u_d, u_q]), (&dx, [du_d, du_q], dw));
-        [rate[0], rate[1], rate[2], change[0], change[1], change[2]]
-    });
-    change.copy_from_slice(&both[3..]);
+    let _ = integrate::advance(
+        &mut both,
+        sample_time,
+        ACCURACY,
+        |&[i_d, i_q, v, di_d, di_q, dv]| {
+            let (x, dx) = ([i_d, i_q, v], [di_d, di_q, dv]);
+            let rate = rectifier.derivative(mode, &x, [u_d, u_q], w);
+            let change = rectifier.differential(mode, (&x, [u_d, u_q]), (&dx, [du_d, du_q], dw));
+            [rate[0], rate[1], rate[2], change[0], change[1], change[2]]
+        },
+    );
+    let [_, _, _, moved @ ..] = both;
+    kernel::copy(change, &moved);
 }

@@ -25,3 +25,8 @@ def test_every_life_of_an_instance(
     lines = c_host.drive(program, fmu, start=start).splitlines()
     assert len(lines) == 400
     assert lines == c_host.drive(program, fmu, start=0.0).splitlines()
+
+
+def test_eight_threads_at_once(tmp_path: Path, example_case: Callable[[str], Case]) -> None:
+    """Loops in eight threads give the bits of one by itself; `make threadcheck` watches them do so."""
+    assert c_host.close_in_threads(example_case("paper").fmus, tmp_path).startswith("8 threads")

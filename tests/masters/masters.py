@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import functools
 import logging
 from typing import TYPE_CHECKING
 
@@ -98,13 +99,16 @@ def in_libcosim_from_package(pair: Exported, steps: int) -> Loop:
     return _observe(CosimExecution.from_ssp_file(str(pair.package)), pair, steps)
 
 
-def in_container(pair: Exported, steps: int) -> Loop:
-    """Both FMUs packed into one by fmu-manipulation-toolbox, which fmpy runs."""
+def in_container(pair: Exported, steps: int, *, controller_first: bool = False) -> Loop:
+    """Both FMUs packed into one by fmu-manipulation-toolbox, which fmpy runs.
+
+    The container initializes in the order of its list: a controller that is listed first leaves
+    initialization mode before there is a mode to be told of.
+    """
     folder = pair.plant.parent
     te = _sample_time(pair)
     node = AssemblyNode("container.fmu", step_size=te, auto_link=False, auto_input=False, auto_output=False)
-    # The container initializes in this order; the controller is to find a mode when its turn comes.
-    for fmu in (pair.plant, pair.controller):
+    for fmu in (pair.controller, pair.plant) if controller_first else (pair.plant, pair.controller):
         node.add_fmu(fmu.name)
     for source, out, target, into in _links(pair, "mode"):
         node.add_link(source.name, out.name, target.name, into.name)
@@ -127,6 +131,7 @@ ALL = {
     "libcosim": in_libcosim,
     "libcosim-ssp": in_libcosim_from_package,
     "container": in_container,
+    "container-controller-first": functools.partial(in_container, controller_first=True),
 }
 
 

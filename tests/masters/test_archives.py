@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import zipfile
 from typing import TYPE_CHECKING
 
@@ -35,6 +36,10 @@ def test_an_fmu_brings_its_papers(example_case: Callable[[str], Case]) -> None:
             page = archive.read("documentation/index.html").decode()
             assert "paper_latency" in page
             assert "gamma" in page
+            assert page.count("<svg") >= 6
+            assert "prefers-color-scheme:dark" in page
+            # Self-contained: nothing is fetched, nothing runs.
+            assert not re.search(r"<script|<img|url\([^#]|@import|(src|href)=\"(?!#|data:)", page)
             for entry in archive.infolist():
                 assert entry.compress_type in (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED)
                 assert entry.date_time == (1980, 1, 1, 0, 0, 0)

@@ -59,8 +59,14 @@ def test_the_delay_is_harmless_where_it_was_designed_for(example_case: Callable[
 
 
 def test_the_delay_is_fatal_where_it_was_not(example_case: Callable[[str], Case]) -> None:
-    """The design without delay diverges when stepped in parallel: its proof was of another loop."""
+    """The design without delay, stepped in parallel, does worse than no control: its proof was of another loop."""
     case = example_case("paper")
     loop = masters.run_fmpy(case.fmus, case.run.trajectories.ticks, masters.Schedule(parallel=True))
-    assert np.abs(loop["y_true"]).max() > 1e3
-    assert np.abs(case.run.trajectories["ftc.y_true"]).max() < 2.0
+    native = case.run.trajectories
+
+    def error(y_true: np.ndarray) -> np.ndarray:
+        return ((native["y_ref"] - y_true) ** 2).mean(axis=0)
+
+    nothing_done = error(np.zeros_like(native["y_ref"]))
+    assert np.all(error(loop["y_true"]) > nothing_done)
+    assert np.all(error(native["ftc.y_true"]) < 0.1 * nothing_done)

@@ -17,6 +17,7 @@ import tempfile
 import time
 from pathlib import Path
 
+import c_host
 import fmpy
 
 import commands
@@ -52,17 +53,6 @@ def uri(folder: Path, platform: str) -> str:
     return f"file:///Z:{folder}" if platform == "win64" else folder.as_uri()
 
 
-def connections(sides: dict[str, fmpy.model_description.ModelDescription]) -> list[str]:
-    """Returns the loop's connections by value reference, Reals only."""
-    arguments = []
-    for source, target, bases in (("p", "c", ("y", "y_ref", "mode_real")), ("c", "p", ("u",))):
-        inputs = {variable.name: variable.valueReference for variable in sides[target].modelVariables}
-        for variable in sides[source].modelVariables:
-            if variable.name.split("[")[0] in bases and variable.causality == "output":
-                arguments += [source, str(variable.valueReference), str(inputs[variable.name])]
-    return arguments
-
-
 def run(platform: str, fmus: commands.Exported, folder: Path) -> tuple[str, float]:
     """Runs the loop on a platform and returns what it printed and the seconds it took."""
     program = folder / f"closed_loop_{platform}.exe"
@@ -81,7 +71,7 @@ def run(platform: str, fmus: commands.Exported, folder: Path) -> tuple[str, floa
         path = "Z:" + str(library).replace("/", "\\") if platform == "win64" else library
         arguments += [path, sides[side].guid, uri(unpacked / "resources", platform)]
     size = str(sides["p"].defaultExperiment.stepSize)
-    command = [*system_of(platform), program, *arguments, size, str(STEPS), *connections(sides)]
+    command = [*system_of(platform), program, *arguments, size, str(STEPS), *c_host.connections(sides)]
     start = time.perf_counter()
     environment = {**os.environ, "WINEDEBUG": "-all", "WINEPREFIX": str(folder / "wine")}
     text = subprocess.run(command, check=True, stdout=subprocess.PIPE, text=True, env=environment).stdout

@@ -1,4 +1,4 @@
-"""The C program of tests/c on an exported FMU, by itself or under another program such as valgrind."""
+"""The C programs of tests/c on exported FMUs, by themselves or under another program such as valgrind."""
 
 from __future__ import annotations
 
@@ -11,15 +11,17 @@ import fmpy
 
 import commands
 
-SOURCE = commands.ROOT / "tests" / "c" / "drive.c"
-VALGRIND = ("valgrind", "--quiet", "--error-exitcode=9", "--leak-check=full", "--show-leak-kinds=all")
+SOURCES = commands.ROOT / "tests" / "c"
+VALGRIND = ("valgrind", "--quiet", "--error-exitcode=9")
+MEMCHECK = (*VALGRIND, "--leak-check=full", "--show-leak-kinds=all")
+STEPS = 60
 
 
-def build(folder: Path) -> Path:
-    """Compiles the program, every warning an error."""
-    program = folder / "drive"
-    flags = ["-std=c11", "-Wall", "-Wextra", "-Werror", "-O1", "-g"]
-    subprocess.run(["cc", *flags, "-o", program, SOURCE, "-ldl"], check=True)
+def build(folder: Path, name: str = "drive") -> Path:
+    """Compiles a program, every warning an error."""
+    program = folder / name
+    flags = ["-std=c11", "-D_POSIX_C_SOURCE=200809L", "-Wall", "-Wextra", "-Werror", "-O1", "-g", "-pthread"]
+    subprocess.run(["cc", *flags, "-o", program, SOURCES / f"{name}.c", "-ldl"], check=True)
     return program
 
 
@@ -48,14 +50,44 @@ def drive(program: Path, fmu: Path, *, start: float = 0.0, count: int = 400, und
         return subprocess.run(command, check=True, stdout=subprocess.PIPE, text=True).stdout
 
 
+def connections(sides: dict[str, fmpy.model_description.ModelDescription]) -> list[str]:
+    """Returns the loop's connections by value reference, Reals only."""
+    arguments = []
+    for source, target, bases in (("p", "c", ("y", "y_ref", "mode_real")), ("c", "p", ("u",))):
+        inputs = {variable.name: variable.valueReference for variable in sides[target].modelVariables}
+        for variable in sides[source].modelVariables:
+            if variable.name.split("[")[0] in bases and variable.causality == "output":
+                arguments += [source, str(variable.valueReference), str(inputs[variable.name])]
+    return arguments
+
+
+def close_in_threads(fmus: commands.Exported, folder: Path, *, under: tuple[str, ...] = ()) -> str:
+    """Closes the loop of a pair in many threads at once and returns what the program says of it."""
+    sides, arguments = {}, []
+    for side, fmu in (("c", fmus.controller), ("p", fmus.plant)):
+        unpacked = folder / f"unpacked_{side}"
+        fmpy.extract(fmu, unpacked)
+        sides[side] = fmpy.read_model_description(unpacked)
+        (library,) = (unpacked / "binaries" / "linux64").iterdir()
+        arguments += [library, sides[side].guid, (unpacked / "resources").as_uri()]
+    size = str(sides["p"].defaultExperiment.stepSize)
+    command = [*under, build(folder, "threads"), *arguments, size, str(STEPS), *connections(sides)]
+    return subprocess.run(command, check=True, stdout=subprocess.PIPE, text=True).stdout
+
+
 def main() -> None:
-    """Runs valgrind's memcheck over the program on both FMUs of a design."""
+    """Runs a tool of valgrind over the programs on both FMUs of a design."""
+    tool, design = sys.argv[1:]
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
+        fmus = commands.export(Path(design), folder)
+        if tool != "memcheck":
+            text = close_in_threads(fmus, folder, under=(*VALGRIND, f"--tool={tool}"))
+            print(f"{tool}: no error, {text}", end="")
+            return
         program = build(folder)
-        fmus = commands.export(Path(sys.argv[1]), folder)
         for fmu in (fmus.controller, fmus.plant):
-            drive(program, fmu, count=60, under=VALGRIND)
+            drive(program, fmu, count=STEPS, under=MEMCHECK)
             print(f"{fmu.name}: no error, no leak")
 
 

@@ -2,11 +2,12 @@
 
 use crate::archive::{self, Contents};
 use crate::certificate::{self, Certificate};
+use crate::documentation;
 use crate::output::Staging;
 use crate::platform::{PLATFORMS, Platform};
 use crate::ssp::{self, Component, System};
-use crate::summary;
 use ftc::design::Design;
+use ftc::simulate::Trajectory;
 use model_description::xml::{self, Document};
 use model_description::{CONTROLLER, Interface, PLANT, VariableTable};
 use std::fmt::Write as _;
@@ -63,6 +64,8 @@ struct Exporter<'a> {
     /// The proof, as `verify` reads it.
     certificate: Vec<u8>,
     interface: Interface,
+    /// The experiment, for the documentation's figures.
+    runs: Vec<Trajectory>,
     binaries: Vec<Binaries>,
 }
 
@@ -80,6 +83,7 @@ pub fn write(design: &Design, staging: Staging, ssp: bool) -> Result<String, Str
             .map_err(|error| error.to_string())?,
         resource,
         interface: Interface::from(design),
+        runs: documentation::runs(design),
         binaries: Binaries::find()?,
     };
     let mut fmus = Contents::new();
@@ -147,7 +151,7 @@ impl Exporter<'_> {
             (certificate::PATH.into(), self.certificate.clone()),
             (
                 "documentation/index.html".into(),
-                documentation(self.design, kind).into_bytes(),
+                self.document(kind).into_bytes(),
             ),
             ("documentation/licenses/license.txt".into(), LICENSES.into()),
         ]);
@@ -155,6 +159,12 @@ impl Exporter<'_> {
             contents.insert(binaries.platform.path(&identifier), binaries.read(kind)?);
         }
         archive::zip(&identifier, &contents)
+    }
+
+    fn document(&self, kind: &Kind) -> String {
+        let title = format!("{}: {}", self.design.name, kind.suffix);
+        let lead = format!("{}.", kind.description);
+        documentation::page(self.design, &self.runs, title, lead)
     }
 
     /// The SSP package: the FMUs under `resources/` beside the description of how they connect.
@@ -295,37 +305,4 @@ fn host_library(binary: &str) -> String {
         std::env::consts::DLL_PREFIX,
         std::env::consts::DLL_SUFFIX
     )
-}
-
-/// A page with the design report.
-fn documentation(design: &Design, kind: &Kind) -> String {
-    let mut body = String::new();
-    for (title, lines) in summary::sections(design) {
-        let _ = writeln!(body, "<h2>{title}</h2>\n<table>");
-        for (name, value) in lines {
-            let _ = writeln!(
-                body,
-                "<tr><th>{}</th><td>{}</td></tr>",
-                escape(&name),
-                escape(&value)
-            );
-        }
-        body.push_str("</table>\n");
-    }
-    format!(
-        "<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n<title>{name} {suffix}</title>\n\
-         <style>body{{font-family:sans-serif;max-width:50em;margin:2em auto;padding:0 1em}}\
-         table{{border-collapse:collapse}}th{{text-align:left;font-weight:normal;color:#555;padding-right:2em;\
-         vertical-align:top}}td,th{{padding-top:.2em}}</style>\n</head>\n<body>\n\
-         <h1>{name}: {suffix}</h1>\n<p>{description}.</p>\n{body}</body>\n</html>\n",
-        name = escape(&design.name),
-        suffix = kind.suffix,
-        description = kind.description,
-    )
-}
-
-fn escape(text: &str) -> String {
-    text.replace('&', "&amp;")
-        .replace('<', "&lt;")
-        .replace('>', "&gt;")
 }

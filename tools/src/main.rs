@@ -15,6 +15,7 @@ mod assemble;
 mod baselines;
 mod certificate;
 mod design_file;
+mod documentation;
 mod export;
 mod failure;
 mod healthy_log;

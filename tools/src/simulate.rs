@@ -57,12 +57,16 @@ fn plant(design: &Design) -> PlantSimulator {
 
 /// Every variant of the design's scenario.
 pub fn trajectories(design: &Design) -> Vec<Trajectory> {
-    let plant = plant(design);
-    let controller = Controller::new(design.controller.clone());
     Variant::ALL
         .iter()
-        .map(|&variant| run(&plant, &controller, variant))
+        .map(|&variant| one(design, variant))
         .collect()
+}
+
+/// One variant of the design's scenario.
+pub fn one(design: &Design, variant: Variant) -> Trajectory {
+    let controller = Controller::new(design.controller.clone());
+    run(&plant(design), &controller, variant)
 }
 
 /// One row per sample: `t`, `mode` and the signals of the scenario, then those of each variant.

@@ -189,7 +189,9 @@ impl Slave for Staircase {
     }
 
     fn initialize(&self, state: &mut State, values: &mut Values) -> Result<(), Refusal> {
+        require_finite(&self.table, values, self.spans.reference)?;
         let start = values.scalar(self.spans.start_at_one);
+        state.ticks = 0;
         state.sum.fill(start + values.scalar(self.spans.reference));
         values.set(self.spans.early, &state.sum);
         values.set(self.spans.late, &state.sum);

@@ -5,7 +5,7 @@
 //! input, and none allocates on success between fmi2ExitInitializationMode and fmi2Terminate.
 
 use crate::clock::Event;
-use crate::life_cycle::{State, States};
+use crate::life_cycle::{Function, State, States};
 use crate::logger::Logger;
 use crate::snapshot::Snapshot;
 use crate::types::{Status, ValueReference};
@@ -162,14 +162,21 @@ impl<S: Slave> Component<S> {
         if !self.current.set_up {
             return Err(Failure::error("call fmi2SetupExperiment first"));
         }
-        self.current.stale = true;
+        (self.current.stale, self.current.provisional) = (true, false);
         self.enter(State::InitializationMode);
         Ok(())
     }
 
-    /// fmi2ExitInitializationMode.
+    /// fmi2ExitInitializationMode. Inputs that cannot be worked with yet are a warning in the
+    /// log: masters initialise the FMUs one after the other, and have until the first step.
     pub fn exit_initialization(&mut self) -> Outcome {
         self.refresh()?;
+        if let Err(Refusal(why)) = self.slave.check_inputs(&self.current.values) {
+            self.current.provisional = true;
+            let name = Function::ExitInitializationMode.name();
+            let text = format!("{name}: {why}; the outputs are provisional until the first step");
+            self.logger.log(Status::Warning, &text);
+        }
         self.enter(State::StepComplete);
         Ok(())
     }
@@ -230,7 +237,7 @@ impl<S: Slave> Component<S> {
                 *slot = convert(value);
             }
         }
-        self.current.stale = true;
+        self.current.stale = self.phase() == State::InitializationMode;
         Ok(())
     }
 
@@ -240,11 +247,15 @@ impl<S: Slave> Component<S> {
     pub fn step(&mut self, from: f64, length: f64) -> Outcome {
         let current = &mut self.current;
         let next = current.clock.advanced(from, length)?;
-        if next.begins_tick()
-            && let Err(refusal) = self.slave.check_inputs(&current.values)
-        {
-            current.clock.refuse(from, length);
-            return Err(refusal.into());
+        if next.begins_tick() {
+            if let Err(refusal) = self.slave.check_inputs(&current.values) {
+                current.clock.refuse(from, length);
+                return Err(refusal.into());
+            }
+            if std::mem::take(&mut current.provisional) {
+                let (state, values) = (&mut current.state, &mut current.values);
+                self.slave.initialize(state, values)?;
+            }
         }
         current.clock = next;
         while let Some(event) = current.clock.next_event() {
@@ -321,6 +332,11 @@ impl<S: Slave> Component<S> {
             self.slave.check_inputs(values)?;
         }
         self.trial.clone_from(state);
+        if self.current.provisional {
+            self.response.clone_from(values);
+            self.slave.initialize(&mut self.trial, &mut self.response)?;
+            self.response.fill(0.0);
+        }
         self.slave.directional_derivative(
             &mut self.trial,
             values,
@@ -377,10 +393,8 @@ impl<S: Slave> Component<S> {
         if current.phase != State::InitializationMode || !current.stale {
             return Ok(());
         }
-        self.slave.check_inputs(&current.values)?;
-        let mut state = self.slave.initial_state();
-        self.slave.initialize(&mut state, &mut current.values)?;
-        current.state = state;
+        self.slave
+            .initialize(&mut current.state, &mut current.values)?;
         current.stale = false;
         Ok(())
     }

@@ -39,5 +39,5 @@ pub mod snapshot;
 pub mod types;
 mod values;
 
-pub use slave::{Refusal, Slave, require_finite, selected_mode};
+pub use slave::{Refusal, Slave, nearest_mode, require_finite, selected_mode};
 pub use values::Values;

@@ -56,10 +56,14 @@ pub trait Slave: Sized + 'static {
     /// The state of a fresh instance, the same at every call.
     fn initial_state(&self) -> Self::State;
 
-    /// Computes the outputs at the start time from parameters and initial inputs.
+    /// Makes the state and the outputs at the start time from parameters and initial inputs,
+    /// whatever `state` held before; allocates nothing.
     ///
-    /// Called with a fresh state, and again with another fresh one whenever values were set in
-    /// initialization mode, so only the last call before the first tick counts.
+    /// Called again whenever values were set in initialization mode, so only the last call
+    /// before the first tick counts. An input whose source may not be initialised yet, such as
+    /// a mode that still reads 0, is taken as best it can be: while [`Slave::check_inputs`]
+    /// refuses it, all this is provisional and done once more when the first tick begins.
+    /// A refusal changes nothing.
     fn initialize(&self, state: &mut Self::State, values: &mut Values) -> Result<(), Refusal>;
 
     /// Tick `k` begins: time goes beyond `k Te`. Inputs are sampled here.
@@ -85,8 +89,7 @@ pub trait Slave: Sized + 'static {
         Ok(())
     }
 
-    /// Whether the inputs can be worked with, asked before a step in which a tick begins, and
-    /// before [`Slave::initialize`].
+    /// Whether the inputs can be worked with, asked before a step in which a tick begins.
     ///
     /// A refusal is fmi2Error and nothing else happens: outputs keep their last values, no tick
     /// is run, and the importer may repeat the step or go on.
@@ -133,12 +136,7 @@ pub fn selected_mode(
     real: Span,
     modes: usize,
 ) -> Result<usize, Refusal> {
-    let twin = values.scalar(real);
-    let (span, value) = if twin == 0.0 {
-        (integer, values.scalar(integer))
-    } else {
-        (real, twin)
-    };
+    let (span, value) = mode_number(values, integer, real);
     if value.fract() == 0.0 && value >= 1.0 && value <= modes as f64 {
         Ok(value as usize - 1)
     } else {
@@ -146,6 +144,21 @@ pub fn selected_mode(
         Err(Refusal(format!(
             "{name} is {value}, but the modes are the whole numbers from 1 to {modes}"
         )))
+    }
+}
+
+/// The mode nearest to the number given, counted from 0: where to start while the mode's source
+/// is not initialised.
+pub fn nearest_mode(values: &Values, integer: Span, real: Span, modes: usize) -> usize {
+    let (_, number) = mode_number(values, integer, real);
+    (number.clamp(1.0, modes.max(1) as f64) as usize).saturating_sub(1)
+}
+
+/// The variable that counts, and its value.
+fn mode_number(values: &Values, integer: Span, real: Span) -> (Span, f64) {
+    match values.scalar(real) {
+        0.0 => (integer, values.scalar(integer)),
+        twin => (real, twin),
     }
 }
 

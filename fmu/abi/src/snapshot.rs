@@ -6,7 +6,7 @@ use crate::{Slave, Values};
 use serde::{Deserialize, Serialize, de::DeserializeOwned};
 
 /// Marks serialised states, with the version of their layout.
-const MARK: [u8; 8] = *b"FTCFMU\0\x01";
+const MARK: [u8; 8] = *b"FTCFMU\0\x02";
 
 /// Length of the checksum at the end.
 const CHECKSUM: usize = size_of::<u32>();
@@ -22,6 +22,9 @@ pub struct Snapshot<T> {
     pub set_up: bool,
     /// Whether values were set in initialization mode since outputs were computed.
     pub stale: bool,
+    /// Whether an input could not be worked with yet at fmi2ExitInitializationMode: the first
+    /// tick initializes once more.
+    pub provisional: bool,
     /// Time.
     pub clock: Clock,
     /// Values of all variables.
@@ -42,7 +45,8 @@ impl<T: Clone> Clone for Snapshot<T> {
 
     /// Copies in place: nothing is allocated if `state` does not.
     fn clone_from(&mut self, source: &Self) {
-        (self.phase, self.set_up, self.stale) = (source.phase, source.set_up, source.stale);
+        (self.phase, self.set_up) = (source.phase, source.set_up);
+        (self.stale, self.provisional) = (source.stale, source.provisional);
         self.clock.clone_from(&source.clock);
         self.values.clone_from(&source.values);
         self.state.clone_from(&source.state);
@@ -62,6 +66,7 @@ impl<T> Snapshot<T> {
             phase: State::Instantiated,
             set_up: false,
             stale: true,
+            provisional: false,
             clock: Clock::new(slave.sample_time()),
             values: Values::start(slave.variables()),
             state: slave.initial_state(),

@@ -5,10 +5,9 @@
 //! that steps the controller before the plant adds no delay to the loop.
 
 use fmu_abi::clock::Event;
-use fmu_abi::{Refusal, Slave, Values, require_finite, resource, selected_mode};
+use fmu_abi::{Refusal, Slave, Values, nearest_mode, require_finite, resource, selected_mode};
 use ftc::control::{Change, Compensate, Controller, ControllerState, Sample};
-use ftc::design::Design;
-use model_description::{CONTROLLER, Interface, Role, Span, VariableTable};
+use model_description::{CONTROLLER, DESIGN_FILE, Interface, Role, Span, VariableTable};
 use std::path::Path;
 
 fmu_abi::export_fmu!(ControllerFmu);
@@ -18,6 +17,8 @@ pub struct ControllerFmu {
     controller: Controller,
     table: VariableTable,
     spans: Spans,
+    /// The state at rest in each mode, to begin with.
+    at_rest: Vec<ControllerState>,
     /// Mode (0-based) a fresh instance rests in.
     first_mode: usize,
 }
@@ -55,22 +56,22 @@ impl Spans {
 }
 
 impl ControllerFmu {
-    /// The active mode (0-based).
-    fn mode(&self, values: &Values) -> Result<usize, Refusal> {
-        let modes = self.controller.parameters().plant.modes.len();
-        selected_mode(
-            &self.table,
-            values,
-            self.spans.mode,
-            self.spans.mode_real,
-            modes,
-        )
+    /// The active mode (0-based); the nearest, where the inputs have not passed their check.
+    fn mode(&self, values: &Values) -> usize {
+        let (mode, twin) = (self.spans.mode, self.spans.mode_real);
+        nearest_mode(values, mode, twin, self.at_rest.len())
     }
 
-    fn sample<'a>(&self, values: &'a Values, tick: u64) -> Result<Sample<'a>, Refusal> {
-        Ok(Sample {
+    /// Refuses references and thresholds that are no finite numbers.
+    fn require_numbers(&self, values: &Values) -> Result<(), Refusal> {
+        require_finite(&self.table, values, self.spans.reference)?;
+        require_finite(&self.table, values, self.spans.threshold)
+    }
+
+    fn sample<'a>(&self, values: &'a Values, tick: u64) -> Sample<'a> {
+        Sample {
             tick,
-            mode: self.mode(values)?,
+            mode: self.mode(values),
             measurement: values.get(self.spans.measurement),
             reference: values.get(self.spans.reference),
             thresholds: values.get(self.spans.threshold),
@@ -79,7 +80,7 @@ impl ControllerFmu {
             } else {
                 Compensate::Nothing
             },
-        })
+        }
     }
 
     fn publish(&self, state: &ControllerState, values: &mut Values) {
@@ -102,18 +103,18 @@ impl Slave for ControllerFmu {
     type State = ControllerState;
 
     fn load(resources: &Path, guid: &str) -> Result<Self, String> {
-        let bytes = resource::read_verified(resources, "design.json", CONTROLLER, guid)?;
-        let design: Design =
-            serde_json::from_slice(&bytes).map_err(|why| format!("design.json: {why}"))?;
-        design
-            .check()
-            .map_err(|why| format!("design.json: {why}"))?;
+        let bytes = resource::read_verified(resources, DESIGN_FILE, CONTROLLER, guid)?;
+        let design = model_description::read_design(&bytes)?;
         let table = model_description::controller(&Interface::from(&design));
+        let modes = 0..design.controller.plant.modes.len();
+        let first_mode = design.scenario.mode(0, design.controller.plant.sample_time);
+        let controller = Controller::new(design.controller);
         Ok(Self {
-            first_mode: design.scenario.mode(0, design.controller.plant.sample_time),
+            at_rest: modes.map(|mode| controller.initial_state(mode)).collect(),
             spans: Spans::of(&table),
-            controller: Controller::new(design.controller),
+            controller,
             table,
+            first_mode,
         })
     }
 
@@ -130,15 +131,18 @@ impl Slave for ControllerFmu {
     }
 
     fn initialize(&self, state: &mut ControllerState, values: &mut Values) -> Result<(), Refusal> {
-        *state = self.controller.initial_state(self.mode(values)?);
+        self.require_numbers(values)?;
+        if let Some(rest) = self.at_rest.get(self.mode(values)) {
+            state.clone_from(rest);
+        }
         self.publish(state, values);
         Ok(())
     }
 
     fn check_inputs(&self, values: &Values) -> Result<(), Refusal> {
-        require_finite(&self.table, values, self.spans.reference)?;
-        require_finite(&self.table, values, self.spans.threshold)?;
-        self.mode(values).map(drop)
+        self.require_numbers(values)?;
+        let (mode, twin) = (self.spans.mode, self.spans.mode_real);
+        selected_mode(&self.table, values, mode, twin, self.at_rest.len()).map(drop)
     }
 
     fn begin_tick(
@@ -147,7 +151,7 @@ impl Slave for ControllerFmu {
         values: &mut Values,
         k: u64,
     ) -> Result<(), Refusal> {
-        self.controller.tick(state, &self.sample(values, k)?);
+        self.controller.tick(state, &self.sample(values, k));
         self.publish(state, values);
         Ok(())
     }
@@ -169,7 +173,7 @@ impl Slave for ControllerFmu {
             Some(Event::Begin(k)) => k,
             Some(Event::End(k)) => k + 1,
         };
-        let sample = self.sample(values, k)?;
+        let sample = self.sample(values, k);
         let change = Change {
             measurement: seed.get(self.spans.measurement),
             reference: seed.get(self.spans.reference),

@@ -2,7 +2,7 @@
 
 use fmu_host::model::example;
 use fmu_host::types::Status;
-use fmu_host::{Counting, Instance, Model, allocations, exercise};
+use fmu_host::{Counting, Instance, Model, assert_nothing_is_allocated};
 use ftc_controller as _;
 
 #[global_allocator]
@@ -11,14 +11,12 @@ static COUNTING: Counting = Counting;
 #[test]
 fn nothing_is_allocated_on_line() {
     let model = Model::controller(&example());
-    let functions = fmu_host::linked!();
-    let it = Instance::new(functions, &model).unwrap();
-    it.silence();
-    it.initialize(0.0, |_| ());
-    let mut run = exercise(&it, 900);
-    assert_eq!(allocations(&mut run), 0);
-    // SAFETY: the instance lives.
-    let end = || assert_eq!(unsafe { (functions.terminate)(it.c) }, Status::Ok);
-    assert_eq!(allocations(end), 0);
-    assert!(allocations(|| drop(it)) > 0, "the counter counts");
+    assert_nothing_is_allocated(fmu_host::linked!(), &model, |_| (), |_| ());
+}
+
+#[test]
+fn nothing_is_allocated_where_the_mode_comes_late() {
+    let model = Model::controller(&example());
+    let unknown = |it: &Instance| assert_eq!(it.set_integer(it.span("mode"), 0), Status::Ok);
+    assert_nothing_is_allocated(fmu_host::linked!(), &model, unknown, |_| ());
 }

@@ -1,12 +1,16 @@
 //! A full run of one instance: everything an importer may do between initialization and the end.
 
-use crate::Instance;
+use crate::{Functions, Instance, Model, allocations};
 use fmu_abi::types::Status;
-use model_description::{Causality, Kind, Span, Variable};
+use model_description::{Causality, Kind, Role, Span, Variable};
 
-/// The Reals of a causality, at most 64.
+/// The Reals of a causality, at most 64; the mode goes by its Integer.
 fn reals(it: &Instance, causality: Causality) -> Vec<u32> {
-    let fits = |v: &Variable| v.causality == causality && matches!(v.kind, Kind::Real { .. });
+    let fits = |v: &Variable| {
+        v.causality == causality
+            && matches!(v.kind, Kind::Real { .. })
+            && !matches!(v.role, Role::ModeReal | Role::ExternalModeReal)
+    };
     let found = it.table.iter().filter(|(_, v)| fits(v));
     found.map(|(reference, _)| reference).take(64).collect()
 }
@@ -33,13 +37,6 @@ pub fn exercise(it: &Instance, ticks: u32) -> impl FnMut() + use<> {
             for (value, &reference) in values.iter_mut().zip(&inputs) {
                 let lost = mode_is_input && reference == measured && k % 50 == 7;
                 *value = if lost { f64::NAN } else { 0.3 * wave };
-            }
-            if let Some(twin) = inputs
-                .iter()
-                .position(|&r| r == mode + 1)
-                .filter(|_| mode_is_input)
-            {
-                values[twin] = 0.0;
             }
             for length in [1.0 / 7.0, 1e-16, 6.0 / 7.0 - 1e-16] {
                 // SAFETY: every array has the length that is said.
@@ -84,4 +81,27 @@ pub fn exercise(it: &Instance, ticks: u32) -> impl FnMut() + use<> {
             }
         }
     }
+}
+
+/// Asserts that a full run allocates nothing from fmi2ExitInitializationMode to fmi2Terminate.
+///
+/// `before_exit` is called in initialization mode, `after_exit` when the run begins.
+pub fn assert_nothing_is_allocated(
+    functions: Functions,
+    model: &Model,
+    before_exit: impl FnOnce(&Instance),
+    after_exit: impl FnOnce(&Instance),
+) {
+    let it = Instance::new(functions, model).expect("an instance");
+    it.silence();
+    it.initialize(0.0, before_exit);
+    let mut run = exercise(&it, 900);
+    let on_line = || {
+        after_exit(&it);
+        run();
+        // SAFETY: the instance lives.
+        assert_eq!(unsafe { (functions.terminate)(it.c) }, Status::Ok);
+    };
+    assert_eq!(allocations(on_line), 0);
+    assert!(allocations(|| drop(it)) > 0, "the counter counts");
 }

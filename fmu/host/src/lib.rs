@@ -13,7 +13,7 @@ pub mod random_calls;
 
 pub use closed_loop::{Coupling, Loop};
 pub use counting::{Counting, allocations};
-pub use exercise::exercise;
+pub use exercise::{assert_nothing_is_allocated, exercise};
 pub use fmu_abi::types;
 pub use functions::{Functions, Library};
 pub use instance::{Instance, Messages};

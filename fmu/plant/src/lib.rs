@@ -6,12 +6,11 @@
 //! faults, disturbance and noise.
 
 use fmu_abi::clock::Event;
-use fmu_abi::{Refusal, Slave, Values, require_finite, resource, selected_mode};
-use ftc::design::Design;
+use fmu_abi::{Refusal, Slave, Values, nearest_mode, require_finite, resource, selected_mode};
 use ftc::simulate::integrate::Stalled;
 use ftc::simulate::plant::{Change, External};
 use ftc::simulate::{PlantSimulator, PlantState};
-use model_description::{Interface, PLANT, Role, Span, VariableTable};
+use model_description::{DESIGN_FILE, Interface, PLANT, Role, Span, VariableTable};
 use std::path::Path;
 
 fmu_abi::export_fmu!(PlantFmu);
@@ -19,6 +18,8 @@ fmu_abi::export_fmu!(PlantFmu);
 /// A plant and where its signals lie.
 pub struct PlantFmu {
     simulator: PlantSimulator,
+    /// The state at rest in each mode, to begin with.
+    at_rest: Vec<PlantState>,
     table: VariableTable,
     spans: Spans,
 }
@@ -64,35 +65,33 @@ impl Spans {
 }
 
 impl PlantFmu {
-    /// The mode (0-based) from outside while the scenario is off.
-    fn external_mode(&self, values: &Values) -> Result<Option<usize>, Refusal> {
-        if values.flag(self.spans.scenario_enabled) {
-            return Ok(None);
-        }
-        let modes = self.simulator.plant().modes.len();
+    /// The mode (0-based) from outside while the scenario is off; the nearest, where the inputs
+    /// have not passed their check.
+    fn external_mode(&self, values: &Values) -> Option<usize> {
         let spans = &self.spans;
-        selected_mode(
-            &self.table,
-            values,
-            spans.external_mode,
-            spans.external_mode_real,
-            modes,
-        )
-        .map(Some)
+        let (mode, twin) = (spans.external_mode, spans.external_mode_real);
+        let plays = values.flag(spans.scenario_enabled);
+        (!plays).then(|| nearest_mode(values, mode, twin, self.at_rest.len()))
     }
 
-    fn external<'a>(&self, values: &'a Values) -> Result<External<'a>, Refusal> {
-        Ok(External {
+    fn external<'a>(&self, values: &'a Values) -> External<'a> {
+        External {
             fault: values.get(self.spans.external_fault),
             disturbance: values.get(self.spans.external_disturbance),
-            mode: self.external_mode(values)?,
+            mode: self.external_mode(values),
             noise: values.flag(self.spans.noise_enabled),
-        })
+        }
+    }
+
+    /// Refuses commands and disturbances that are no finite numbers.
+    fn require_numbers(&self, values: &Values) -> Result<(), Refusal> {
+        require_finite(&self.table, values, self.spans.command)?;
+        require_finite(&self.table, values, self.spans.external_disturbance)
     }
 
     /// Observes the present tick and publishes every output.
-    fn publish(&self, state: &mut PlantState, values: &mut Values) -> Result<(), Refusal> {
-        self.simulator.observe(state, &self.external(values)?);
+    fn publish(&self, state: &mut PlantState, values: &mut Values) {
+        self.simulator.observe(state, &self.external(values));
         let spans = &self.spans;
         values.set(spans.measurement, &state.y);
         values.set(spans.true_output, &state.y_true);
@@ -103,7 +102,6 @@ impl PlantFmu {
         let number = [(state.mode + 1) as f64];
         values.set(spans.mode, &number);
         values.set(spans.mode_real, &number);
-        Ok(())
     }
 }
 
@@ -111,20 +109,16 @@ impl Slave for PlantFmu {
     type State = PlantState;
 
     fn load(resources: &Path, guid: &str) -> Result<Self, String> {
-        let bytes = resource::read_verified(resources, "design.json", PLANT, guid)?;
-        let design: Design =
-            serde_json::from_slice(&bytes).map_err(|why| format!("design.json: {why}"))?;
-        design
-            .check()
-            .map_err(|why| format!("design.json: {why}"))?;
+        let bytes = resource::read_verified(resources, DESIGN_FILE, PLANT, guid)?;
+        let design = model_description::read_design(&bytes)?;
         let table = model_description::plant(&Interface::from(&design));
+        let plant = design.controller.plant;
+        let modes = 0..plant.modes.len();
+        let simulator = PlantSimulator::with_truth(plant, design.truth, design.scenario);
         Ok(Self {
+            at_rest: modes.map(|mode| simulator.initial_state_in(mode)).collect(),
             spans: Spans::of(&table),
-            simulator: PlantSimulator::with_truth(
-                design.controller.plant,
-                design.truth,
-                design.scenario,
-            ),
+            simulator,
             table,
         })
     }
@@ -142,16 +136,24 @@ impl Slave for PlantFmu {
     }
 
     fn initialize(&self, state: &mut PlantState, values: &mut Values) -> Result<(), Refusal> {
-        if let Some(mode) = self.external_mode(values)? {
-            *state = self.simulator.initial_state_in(mode);
+        self.require_numbers(values)?;
+        let external = self.external_mode(values);
+        let mode = external.unwrap_or_else(|| self.simulator.first_mode());
+        if let Some(rest) = self.at_rest.get(mode) {
+            state.clone_from(rest);
         }
-        self.publish(state, values)
+        self.publish(state, values);
+        Ok(())
     }
 
     fn check_inputs(&self, values: &Values) -> Result<(), Refusal> {
-        require_finite(&self.table, values, self.spans.command)?;
-        require_finite(&self.table, values, self.spans.external_disturbance)?;
-        self.external_mode(values).map(drop)
+        self.require_numbers(values)?;
+        let spans = &self.spans;
+        if values.flag(spans.scenario_enabled) {
+            return Ok(());
+        }
+        let (mode, twin) = (spans.external_mode, spans.external_mode_real);
+        selected_mode(&self.table, values, mode, twin, self.at_rest.len()).map(drop)
     }
 
     fn begin_tick(
@@ -160,7 +162,7 @@ impl Slave for PlantFmu {
         values: &mut Values,
         _k: u64,
     ) -> Result<(), Refusal> {
-        self.simulator.observe(state, &self.external(values)?);
+        self.simulator.observe(state, &self.external(values));
         let command = values.get(self.spans.command);
         self.simulator.advance(state, command).map_err(|Stalled| {
             Refusal::from(
@@ -175,7 +177,8 @@ impl Slave for PlantFmu {
         values: &mut Values,
         _k: u64,
     ) -> Result<(), Refusal> {
-        self.publish(state, values)
+        self.publish(state, values);
+        Ok(())
     }
 
     const PROVIDES_DIRECTIONAL_DERIVATIVE: bool = true;
@@ -190,7 +193,7 @@ impl Slave for PlantFmu {
         response: &mut Values,
     ) -> Result<(), Refusal> {
         let spans = &self.spans;
-        let external = self.external(values)?;
+        let external = self.external(values);
         let change = Change {
             command: seed.get(spans.command),
             fault: seed.get(spans.external_fault),

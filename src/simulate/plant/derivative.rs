@@ -5,7 +5,7 @@
 
 use super::{External, PlantSimulator, PlantState};
 use crate::control::kernel;
-use crate::simulate::scenario::FaultKind;
+use crate::simulate::scenario::{FaultEvent, FaultKind};
 use crate::simulate::truth::{self, Truth};
 
 /// Small changes of the plant's inputs.
@@ -73,8 +73,10 @@ impl PlantSimulator {
             let _ = self.advance(trial, u);
         } else {
             let _ = self.advance(trial, u);
-            let mode = &self.plant.modes[trial.mode];
             trial.next.fill(0.0);
+            let Some((mode, _)) = self.described(trial.mode) else {
+                return;
+            };
             kernel::add_product(&mut trial.next, &mode.b, change.command);
             kernel::add_product(&mut trial.next, &mode.e, change.disturbance);
         }
@@ -101,51 +103,51 @@ impl PlantSimulator {
         change: &Change<'_>,
         moved: bool,
     ) {
-        let mode = &self.plant.modes[trial.mode];
         trial.y_true.fill(0.0);
+        let Some((mode, _)) = self.described(trial.mode) else {
+            return;
+        };
         if moved {
             kernel::add_product(&mut trial.y_true, &mode.c, &trial.x);
         }
         kernel::add_product(&mut trial.y_true, &mode.f, change.disturbance);
-        for (sensor, &added) in change.fault.iter().enumerate() {
-            self.differentiate_sensor(trial, sensor, added, external.mode.is_none());
+        let (tick, events) = (trial.tick, external.mode.is_none());
+        let read = trial
+            .y
+            .iter_mut()
+            .zip(&mut trial.fault)
+            .zip(&mut trial.last);
+        let clean = trial.y_true.iter().zip(change.fault);
+        for (sensor, (((y, fault), last), (&healthy, &added))) in read.zip(clean).enumerate() {
+            let struck = self.striking(sensor, tick, events);
+            (*y, *fault) = differentiate_sensor(struck, healthy, added, last);
         }
     }
+}
 
-    /// The same steps as a reading takes, for its change.
-    fn differentiate_sensor(
-        &self,
-        trial: &mut PlantState,
-        sensor: usize,
-        added: f64,
-        events: bool,
-    ) {
-        let (tick, te) = (trial.tick, self.plant.sample_time);
-        let healthy = trial.y_true[sensor];
-        let mut reading = healthy + added;
-        let (mut struck, mut silent) = (false, false);
-        for event in &self.scenario.events {
-            if !(events && event.sensor == sensor && event.active(tick, te)) {
-                continue;
-            }
-            struck = true;
-            match event.kind {
-                FaultKind::Bias { .. }
-                | FaultKind::Drift { .. }
-                | FaultKind::Intermittent { .. } => {}
-                FaultKind::GainLoss { loss } => reading *= 1.0 - loss,
-                FaultKind::Stuck => (reading, silent) = (trial.last[sensor], false),
-                FaultKind::Dropout => silent = true,
-            }
+/// The same steps as a reading takes, for its change and that of its fault.
+fn differentiate_sensor<'a>(
+    events: impl Iterator<Item = &'a FaultEvent>,
+    healthy: f64,
+    added: f64,
+    last: &mut f64,
+) -> (f64, f64) {
+    let mut reading = healthy + added;
+    let (mut struck, mut silent) = (false, false);
+    for event in events {
+        struck = true;
+        match event.kind {
+            FaultKind::Bias { .. } | FaultKind::Drift { .. } | FaultKind::Intermittent { .. } => {}
+            FaultKind::GainLoss { loss } => reading *= 1.0 - loss,
+            FaultKind::Stuck => (reading, silent) = (*last, false),
+            FaultKind::Dropout => silent = true,
         }
-        if silent {
-            (trial.y[sensor], trial.fault[sensor]) = (0.0, 0.0);
-            return;
-        }
-        if !struck {
-            trial.last[sensor] = reading;
-        }
-        trial.y[sensor] = reading;
-        trial.fault[sensor] = reading - healthy;
     }
+    if silent {
+        return (0.0, 0.0);
+    }
+    if !struck {
+        *last = reading;
+    }
+    (reading, reading - healthy)
 }

@@ -17,7 +17,7 @@ pub mod page;
 mod svg;
 pub mod text;
 
-pub use demo::{events, write};
+pub use demo::{Scene, events, write};
 
 #[cfg(test)]
 mod tests;

@@ -283,6 +283,33 @@ fn an_impossible_input_is_named_and_the_instance_goes_on() {
 }
 
 #[test]
+fn an_input_that_is_not_ready_in_initialization_mode_may_come_later() {
+    let it = Instance::new(&Resources::new(0.1));
+    it.set_mode(0);
+    it.set(REFERENCE, 4.0);
+    it.start(0.0);
+    let warned = it.messages.lock().unwrap()[..]
+        .iter()
+        .filter(|(status, category, _)| {
+            (*status, category.as_str()) == (Status::Warning, "logStatusWarning")
+        })
+        .count();
+    assert_eq!(warned, 1);
+    assert_eq!(it.real(LATE[0]), 4.0);
+    assert_eq!(it.step(0.0, 0.1), Status::Error);
+    assert!(it.last_message().contains("fmi2DoStep: mode is 0"));
+    it.set_mode(2);
+    it.set(REFERENCE, 5.0);
+    it.set(INPUT[0], 1.0);
+    assert_eq!(it.real(LATE[0]), 4.0, "nothing changes before the step");
+    assert_eq!(it.step(0.0, 0.1), Status::Ok);
+    assert_eq!(it.real(LATE[0]), 7.0, "initialized anew, then one tick");
+    it.set(REFERENCE, 9.0);
+    assert_eq!(it.step(0.1, 0.1), Status::Ok);
+    assert_eq!(it.real(LATE[0]), 9.0, "that happens once");
+}
+
+#[test]
 fn a_bad_input_between_ticks_does_not_matter() {
     let it = started();
     it.step(0.0, 0.05);

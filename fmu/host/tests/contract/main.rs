@@ -3,6 +3,7 @@
 #![allow(missing_docs, reason = "tests have names")]
 
 mod derivatives;
+mod initialization;
 mod inputs;
 mod random_calls;
 mod resources;

@@ -10,7 +10,7 @@ use super::svg;
 use super::text::{self, count, list, number};
 use anyhow::{Context, Result};
 use events::Alarms;
-use figures::Scene;
+pub use figures::Scene;
 use ftc::design::{Design, Signal};
 use ftc::simulate::{Trajectory, Variant};
 use std::io::Write as _;
