@@ -11,7 +11,7 @@ ZIG := target/platforms/zig
 FUZZER := cargo-fuzz@0.13.1
 TOOLS := $(CURDIR)/target/tools
 
-.PHONY: build fmu-linux64 fmu-all compare-platforms test test-rust test-python demo bench fuzz soak memcheck threadcheck lint clean
+.PHONY: build fmu-linux64 fmu-all compare-platforms test test-rust test-python browser demo bench fuzz soak memcheck threadcheck lint clean
 
 # The FMU binaries are made by themselves, with the profile meant for them: built with the whole
 # workspace they would carry the solver's symbols along.
@@ -48,6 +48,23 @@ test-rust: build
 # PYTEST may hold options, such as --nothing-skipped.
 test-python: build $(VENV)/ready
 	$(IN_VENV)python -m pytest $(PYTEST)
+
+# Every kind of page the program writes, opened in a headless Chromium, which is installed where there
+# is none. Pictures of what was seen are left in out/browser/seen.
+BROWSER := out/browser
+
+browser: build
+	tests/browser/install.sh
+	rm -rf $(BROWSER)
+	target/release/ftc-fmu --quiet simulate examples/paper.toml --baselines --out $(BROWSER)/simulate
+	target/release/ftc-fmu --quiet simulate examples/tank.toml --out $(BROWSER)/tank
+	target/release/ftc-fmu --quiet reproduce paper --out $(BROWSER)/reproduce
+	target/release/ftc-fmu --quiet reproduce converter --out $(BROWSER)/reproduce
+	target/release/ftc-fmu --quiet export examples/paper.toml --out $(BROWSER)
+	for fmu in controller plant; do $(PYTHON) -m zipfile -e $(BROWSER)/*_$$fmu.fmu $(BROWSER)/$$fmu; done
+	$(PYTHON) tests/browser/check_pages.py --screenshots $(BROWSER)/seen $(BROWSER)/simulate/report.html \
+		$(BROWSER)/tank/report.html $(BROWSER)/reproduce/paper.html $(BROWSER)/reproduce/converter.html \
+		$(BROWSER)/controller/documentation/index.html $(BROWSER)/plant/documentation/index.html
 
 demo: build $(VENV)/ready
 	PYTHONPATH=tests/support $(IN_VENV)python tests/fmpy/demo.py examples/paper.toml out/demo

@@ -15,7 +15,7 @@ from pathlib import Path
 
 from chromium import Chromium
 
-WIDTHS = (360, 1280)
+WIDTHS = (360, 390, 1280)
 SCHEMES = ("light", "dark")
 SMALLEST_LETTERING = 8.0
 
@@ -99,7 +99,7 @@ def check_page(browser: Chromium, page: Path, screenshots: Path | None) -> int:
             colours[scheme] = browser.evaluate(COLOURS)
             if screenshots:
                 screenshots.mkdir(parents=True, exist_ok=True)
-                name = f"{page.parent.name}-{page.stem}-{width}-{scheme}.png"
+                name = f"{page.parent.parent.name}-{page.parent.name}-{page.stem}-{width}-{scheme}.png"
                 browser.screenshot(screenshots / name)
             for problem in problems:
                 print(f"{page}, {width} px, {scheme}: {problem}", file=sys.stderr)

@@ -1,5 +1,6 @@
 //! The design report, for a person and for a program.
 
+use crate::report::text::count;
 use crate::warnings;
 use ftc::control::parameters::{EstimatorMethod, ObserverKind};
 use ftc::design::{ControlSpec, Design, DesignError, ObserverDesign, Signal, StateFeedback};
@@ -53,8 +54,11 @@ fn overview(design: &Design) -> Vec<(String, String)> {
         line(
             "plant",
             format!(
-                "{} states, {} inputs, {} outputs, {} disturbances",
-                dims.states, dims.inputs, dims.outputs, dims.disturbances
+                "{}, {}, {}, {}",
+                count(dims.states, "state"),
+                count(dims.inputs, "input"),
+                count(dims.outputs, "output"),
+                count(dims.disturbances, "disturbance")
             ),
         ),
         line("modes", names.join(", ")),
@@ -70,7 +74,7 @@ fn feedback(design: &Design, control: &StateFeedback) -> Vec<(String, String)> {
         .collect();
     let mut lines = vec![
         line("tracked outputs", tracked.join(", ")),
-        line("latency", format!("{} samples", spec.latency)),
+        line("latency", count(spec.latency, "sample")),
         line("decay asked", format!("{} per sample", spec.decay)),
     ];
     lines.extend(internal_model(design, control));
@@ -124,7 +128,7 @@ fn estimator(design: &Design) -> Vec<(String, String)> {
     let outputs = &design.signals.outputs;
     lines.push(line(
         "response length",
-        format!("{} samples", estimator.response_length),
+        count(estimator.response_length, "sample"),
     ));
     for (index, predictor) in estimator.predictors.iter().enumerate() {
         lines.push(line(
@@ -140,7 +144,10 @@ fn estimator(design: &Design) -> Vec<(String, String)> {
         "thresholds",
         with_units(&estimator.thresholds, outputs),
     ));
-    lines.push(line("debounce", format!("{} samples", estimator.debounce)));
+    lines.push(line(
+        "debounce",
+        count(estimator.debounce as usize, "sample"),
+    ));
     if estimator.stuck_after > 0 {
         lines.push(line(
             "stuck after",
@@ -151,8 +158,9 @@ fn estimator(design: &Design) -> Vec<(String, String)> {
         lines.push(line(
             "disturbance",
             format!(
-                "period {:.6} samples, {} harmonics",
-                harmonics.period, harmonics.count
+                "period {:.6} samples, {}",
+                harmonics.period,
+                count(harmonics.count, "harmonic")
             ),
         ));
     }

@@ -220,7 +220,37 @@ impl EstimatorState {
         if healthy && !corrected {
             self.learn(estimator, seen.mode);
         }
+        self.refine(estimator, seen);
         self.hold = self.hold.saturating_sub(1);
+    }
+
+    /// Adds what adaptation learned to prediction and residual, and to the estimate of every declared
+    /// fault that was judged anew; the flags stay.
+    fn refine(&mut self, estimator: &Estimator, seen: &Observation<'_>) {
+        if estimator.method != EstimatorMethod::Reference {
+            return;
+        }
+        let Some(adaptation) = self.adaptations.get(seen.mode) else {
+            return;
+        };
+        let estimates = self.fault.iter_mut().zip(&self.flagged);
+        let signals = self.prediction.iter_mut().zip(&mut self.residual);
+        let limits = seen.y.iter().zip(&estimator.largest_fault);
+        for (((addition, (prediction, residual)), (fault, &flagged)), (&value, &largest)) in
+            adaptation
+                .additions()
+                .zip(signals)
+                .zip(estimates)
+                .zip(limits)
+        {
+            *prediction = kernel::bounded(*prediction + addition);
+            if is_measurement(value) {
+                *residual = value - *prediction;
+                if flagged && self.judged {
+                    *fault = residual.clamp(-largest, largest);
+                }
+            }
+        }
     }
 
     /// The reference window: leaves prediction and residual, and returns how far to trust them;
@@ -234,7 +264,8 @@ impl EstimatorState {
             self.history.regressor(),
         );
         if let Some(adaptation) = self.adaptations.get_mut(seen.mode) {
-            adaptation.improve(self.history.regressor(), &mut self.prediction);
+            let regressor = self.history.regressor();
+            adaptation.predict(predictor, regressor, seen.y0, &self.prediction);
         }
         let leverage = self.history.leverage(&predictor.factor);
         let mut spread = 1.0 + leverage;
@@ -271,11 +302,8 @@ impl EstimatorState {
             settled = learned.is_settled(known);
             learned.learn(known, &self.residual);
         }
-        if settled
-            && let Some(adaptation) = self.adaptations.get_mut(mode)
-            && let Some(predictor) = estimator.predictors.get(mode)
-        {
-            adaptation.learn(predictor, self.history.regressor(), &self.residual);
+        if settled && let Some(adaptation) = self.adaptations.get_mut(mode) {
+            adaptation.learn(self.history.regressor(), &self.residual);
         }
     }
 

@@ -10,9 +10,9 @@
 //! sum |S C (x_k - x_s)|^2 W_y^2 + |u_k - u_s|^2 W_u^2  +  (x_N - x_s)' P (x_N - x_s)
 //! ```
 //!
-//! subject to the input limits. Where no limit binds the optimum is a linear function of the state
-//! and needs no iteration; where one does, the quadratic programme is solved. Here `(x_s, u_s)` is the steady state that puts `S (C x + d)` on
-//! the reference, and `P` solves the Riccati equation.
+//! subject to the input limits. Here `(x_s, u_s)` is the steady state that puts `S (C x + d)` on the
+//! reference, and `P` solves the Riccati equation. With the states eliminated the programme differs
+//! from sample to sample in its linear term alone, so it is prepared once per mode.
 
 use crate::control::parameters::Limits;
 use crate::plant::{Mode, SwitchedPlant};
@@ -20,7 +20,7 @@ use crate::simulate::closed_loop::{Regulator, Report};
 use crate::simulate::plant::PlantState;
 use clarabel::algebra::CscMatrix;
 use clarabel::solver::{DefaultSettings, DefaultSolver, IPSolver, SupportedConeT};
-use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
+use nalgebra::{DMatrix, DVector};
 use std::ops::AddAssign;
 
 /// What the controller is asked for.
@@ -58,10 +58,8 @@ pub struct Predictive {
 /// Everything of one mode that can be computed beforehand.
 struct Planner {
     solver: DefaultSolver<f64>,
-    /// Factor of the quadratic term.
-    hessian: Cholesky<f64, Dyn>,
-    /// Lowest and highest deviation from `u0` of each input (m).
-    room: Vec<(f64, f64)>,
+    /// m.
+    inputs: usize,
     /// `q = from_state (x - x_s) + from_input u_s`.
     from_state: DMatrix<f64>,
     from_input: DMatrix<f64>,
@@ -185,95 +183,97 @@ impl Regulator for Predictive {
 }
 
 impl Planner {
+    fn new(plant: &SwitchedPlant, spec: &PredictiveSpec, index: usize) -> Result<Self, String> {
+        let mode = &plant.modes[index];
+        let m = mode.b.ncols();
+        let Condensed { hessian, pull } = Condensed::new(mode, spec)?;
+        let repeat = DMatrix::from_fn(hessian.nrows(), m, |row, column| {
+            f64::from(row % m == column)
+        });
+        let select = mode.c.select_rows(&spec.tracked);
+        Ok(Self {
+            solver: programme(
+                &hessian,
+                spec.horizon,
+                &mode.operating_point.u,
+                &spec.limits,
+            )?,
+            // The plan is in deviations from u0, the cost in deviations from u_s.
+            from_input: -(&hessian * repeat),
+            from_state: pull,
+            target: steady_state(&mode.a, &mode.b, &select)?,
+            kalman: kalman(plant, index, spec)?,
+            inputs: m,
+        })
+    }
+
     /// The first inputs of the optimal plan as deviations from `u0` (m); none where the solver fails.
+    /// The programme was prepared once: only its linear term (m N) changes.
     fn first_step(&mut self, linear: &DVector<f64>) -> Option<Vec<f64>> {
-        let m = self.room.len();
-        let free = -self.hessian.solve(linear);
-        let fits = |(step, room): (&f64, &(f64, f64))| (room.0..=room.1).contains(step);
-        if free.iter().zip(self.room.iter().cycle()).all(fits) {
-            return Some(free.rows(0, m).iter().copied().collect());
-        }
         self.solver.update_q(&linear.as_slice().to_vec()).ok()?;
         self.solver.solve();
         let plan = &self.solver.solution.x;
         let finite = plan.iter().all(|value| value.is_finite());
-        finite.then(|| plan.iter().take(m).copied().collect())
+        finite.then(|| plan.iter().take(self.inputs).copied().collect())
     }
+}
 
-    fn new(plant: &SwitchedPlant, spec: &PredictiveSpec, index: usize) -> Result<Self, String> {
-        let mode = &plant.modes[index];
+/// The cost with the states eliminated: `U' hessian U / 2 + (pull (x - x_s))' U` in deviations of the
+/// inputs from `u_s`, one after the other (m N).
+struct Condensed {
+    /// m N x m N, positive definite.
+    hessian: DMatrix<f64>,
+    /// m N x n.
+    pull: DMatrix<f64>,
+}
+
+impl Condensed {
+    fn new(mode: &Mode, spec: &PredictiveSpec) -> Result<Self, String> {
         let (a, b) = (&mode.a, &mode.b);
         let (n, m) = b.shape();
-        let horizon = spec.horizon;
-        let select = mode.c.select_rows(&spec.tracked);
-        let weighted =
-            DMatrix::from_diagonal(&DVector::from_column_slice(&spec.output_weight)) * &select;
+        let weighted = DMatrix::from_diagonal(&DVector::from_column_slice(&spec.output_weight))
+            * mode.c.select_rows(&spec.tracked);
         let state_cost = weighted.transpose() * &weighted;
         let input_cost = DMatrix::from_diagonal(&DVector::from_fn(m, |i, _| {
             spec.input_weight[i].powi(2).max(1e-9)
         }));
         let terminal = riccati(a, b, &state_cost, &input_cost)?;
-
-        // X = free x + forced U over k = 1..N.
-        let mut free = DMatrix::zeros(n * horizon, n);
-        let mut forced = DMatrix::zeros(n * horizon, m * horizon);
-        let mut power = a.clone();
-        for k in 0..horizon {
-            free.rows_mut(n * k, n).copy_from(&power);
-            power = a * power;
+        let (free, forced) = responses(a, b, spec.horizon);
+        let mut weighted = forced.clone();
+        for k in 0..spec.horizon {
+            let last = k + 1 == spec.horizon;
+            let cost = if last { &terminal } else { &state_cost };
+            let block = cost * forced.rows(n * k, n);
+            weighted.rows_mut(n * k, n).copy_from(&block);
         }
-        for k in 0..horizon {
-            for j in 0..=k {
-                let block = if j == k {
-                    b.clone()
-                } else {
-                    free.rows(n * (k - j - 1), n) * b
-                };
-                forced.view_mut((n * k, m * j), (n, m)).copy_from(&block);
-            }
+        let mut hessian = 2.0 * forced.transpose() * &weighted;
+        for k in 0..spec.horizon {
+            let mut block = hessian.view_mut((m * k, m * k), (m, m));
+            block += 2.0 * &input_cost;
         }
-        let mut weight = DMatrix::zeros(n * horizon, n * horizon);
-        let mut effort = DMatrix::zeros(m * horizon, m * horizon);
-        for k in 0..horizon {
-            let cost = if k + 1 == horizon {
-                &terminal
-            } else {
-                &state_cost
-            };
-            weight.view_mut((n * k, n * k), (n, n)).copy_from(cost);
-            effort
-                .view_mut((m * k, m * k), (m, m))
-                .copy_from(&input_cost);
-        }
-        let pull = 2.0 * forced.transpose() * weight;
-        let hessian = &pull * &forced + 2.0 * &effort;
-        let repeat = DMatrix::from_fn(m * horizon, m, |row, column| f64::from(row % m == column));
-        // The plan is in deviations from u0, the cost in deviations from u_s; so the input that holds x_s
-        // moves the states too: deviations of x from x_s follow A (x - x_s) + B (u - u_s).
-        let from_input = -(&hessian * &repeat);
         Ok(Self {
-            solver: programme(&hessian, horizon, &mode.operating_point.u, &spec.limits)?,
-            room: room(&mode.operating_point.u, &spec.limits),
-            hessian: hessian
-                .cholesky()
-                .ok_or("the quadratic term is not positive definite")?,
-            from_state: pull * free,
-            from_input,
-            target: steady_state(a, b, &select)?,
-            kalman: kalman(plant, index, spec)?,
+            hessian,
+            pull: 2.0 * weighted.transpose() * free,
         })
     }
 }
 
-/// How far each input may go from `u0`, downwards and upwards.
-fn room(u0: &[f64], limits: &[Limits]) -> Vec<(f64, f64)> {
-    let of = |(limit, centre): (&Limits, &f64)| {
-        (
-            limit.min.map_or(f64::NEG_INFINITY, |min| min - centre),
-            limit.max.map_or(f64::INFINITY, |max| max - centre),
-        )
-    };
-    limits.iter().zip(u0).map(of).collect()
+/// `X = free x + forced U` over `k = 1..N`: n N x n and n N x m N.
+fn responses(a: &DMatrix<f64>, b: &DMatrix<f64>, horizon: usize) -> (DMatrix<f64>, DMatrix<f64>) {
+    let (n, m) = b.shape();
+    let mut free = DMatrix::zeros(n * horizon, n);
+    let mut forced = DMatrix::zeros(n * horizon, m * horizon);
+    let mut power = DMatrix::identity(n, n);
+    for k in 0..horizon {
+        let response = &power * b;
+        for later in k..horizon {
+            let corner = (n * later, m * (later - k));
+            forced.view_mut(corner, (n, m)).copy_from(&response);
+        }
+        power = a * power;
+        free.rows_mut(n * k, n).copy_from(&power);
+    }
+    (free, forced)
 }
 
 /// The quadratic programme with box constraints on every planned input.
@@ -413,4 +413,100 @@ fn riccati(
         }
     }
     Err("the Riccati recursion does not converge: the mode cannot be stabilised".into())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::plant::OperatingPoint;
+    use proptest::prelude::*;
+
+    const HORIZON: usize = 12;
+
+    fn plant(entries: &[f64]) -> SwitchedPlant {
+        SwitchedPlant {
+            sample_time: 1.0,
+            modes: vec![Mode {
+                name: "only".into(),
+                a: DMatrix::from_row_slice(2, 2, &entries[..4]),
+                b: DMatrix::from_row_slice(2, 2, &entries[4..8]),
+                c: DMatrix::identity(2, 2),
+                e: DMatrix::zeros(2, 0),
+                f: DMatrix::zeros(2, 0),
+                operating_point: OperatingPoint::zero(2, 2, 2),
+            }],
+        }
+    }
+
+    fn spec(limit: f64) -> PredictiveSpec {
+        let limits = Limits {
+            min: Some(-limit),
+            max: Some(limit),
+        };
+        PredictiveSpec {
+            tracked: vec![0, 1],
+            output_weight: vec![1.0, 0.5],
+            input_weight: vec![0.3, 0.2],
+            limits: vec![limits; 2],
+            noise: vec![0.01; 2],
+            disturbance: vec![],
+            horizon: HORIZON,
+        }
+    }
+
+    proptest! {
+        /// Where no limit is near the plan is that of the closed form, `-hessian^-1 q`; where
+        /// limits bind, going down the gradient from it within the box gains nothing.
+        #[test]
+        fn the_plan_is_optimal(
+            entries in prop::collection::vec(-1.0..1.0f64, 8),
+            deviation in prop::collection::vec(-1.0..1.0f64, 2),
+            limit in prop_oneof![Just(1e3), 0.01..0.3f64],
+        ) {
+            let (plant, spec) = (plant(&entries), spec(limit));
+            let Ok(condensed) = Condensed::new(&plant.modes[0], &spec) else {
+                return Err(TestCaseError::reject("cannot be stabilised"));
+            };
+            let Ok(mut planner) = Planner::new(&plant, &spec, 0) else {
+                return Err(TestCaseError::reject("no steady state"));
+            };
+            let linear = &planner.from_state * DVector::from_column_slice(&deviation);
+            let first = planner.first_step(&linear).unwrap();
+            let plan = DVector::from_column_slice(&planner.solver.solution.x);
+            prop_assert_eq!(&first[..], &plan.as_slice()[..2]);
+            let cost = |u: &DVector<f64>| {
+                0.5 * u.dot(&(&condensed.hessian * u)) + linear.dot(u)
+            };
+            // The solver promises a duality gap of 1e-8 of the cost, and bounds as well kept.
+            let gap = 1e-7 * (1.0 + cost(&plan).abs());
+            prop_assert!(plan.amax() <= limit + 1e-7 * (1.0 + limit), "{plan} beyond {limit}");
+            let free = -condensed.hessian.clone().cholesky().unwrap().solve(&linear);
+            if free.amax() < limit {
+                prop_assert!(cost(&plan) <= cost(&free) + gap, "{plan} for {free}");
+            }
+            // Steps down the gradient, back into the box each time, never raise the cost.
+            let step = 1.0 / condensed.hessian.norm();
+            let mut better = plan.clone();
+            for _ in 0..500 {
+                better -= step * (&condensed.hessian * &better + &linear);
+                better.apply(|u| *u = u.clamp(-limit, limit));
+            }
+            prop_assert!(cost(&plan) <= cost(&better) + gap, "{plan} for {better}");
+        }
+    }
+
+    /// What the states do under a plan is what stepping the model gives.
+    #[test]
+    fn the_responses_are_those_of_the_model() {
+        let plant = plant(&[0.5, 0.2, -0.3, 0.9, 1.0, 0.4, -0.7, 0.6]);
+        let (a, b) = (&plant.modes[0].a, &plant.modes[0].b);
+        let (free, forced) = responses(a, b, HORIZON);
+        let plan = DVector::from_fn(2 * HORIZON, |i, _| (i as f64).sin());
+        let mut x = DVector::from_column_slice(&[0.3, -0.8]);
+        let states = free * &x + forced * &plan;
+        for k in 0..HORIZON {
+            x = a * x + b * plan.rows(2 * k, 2);
+            assert!((&x - states.rows(2 * k, 2)).amax() < 1e-12, "sample {k}");
+        }
+    }
 }

@@ -3,6 +3,8 @@
 //! The plant is the nonlinear averaged rectifier of examples/converter.toml; the paper gives no
 //! parameters of its own.
 
+#[cfg(test)]
+mod fairness;
 mod page;
 
 use super::Findings;
@@ -184,7 +186,7 @@ fn attempt(design: &Design, case: Case) -> Result<Trial, String> {
     let trajectories = CONTENDERS
         .into_iter()
         .map(|variant| match variant {
-            Variant::Predictive => predict(design, &plant),
+            Variant::Predictive => predict(design, &plant, HORIZON, INPUT_WEIGHT),
             _ => Ok(simulate(&plant, &controller, variant)),
         })
         .collect::<Result<Vec<_>, String>>()?;
@@ -208,7 +210,12 @@ fn attempt(design: &Design, case: Case) -> Result<Trial, String> {
 
 /// The predictive controller: the same model, weights and limits, told the noise and the
 /// disturbance's size.
-fn predict(design: &Design, plant: &PlantSimulator) -> Result<Trajectory, String> {
+fn predict(
+    design: &Design,
+    plant: &PlantSimulator,
+    horizon: usize,
+    input_weight: f64,
+) -> Result<Trajectory, String> {
     let controller = &design.controller;
     let spec = PredictiveSpec {
         tracked: controller.feedback.tracked.clone(),
@@ -216,11 +223,11 @@ fn predict(design: &Design, plant: &PlantSimulator) -> Result<Trajectory, String
             || vec![1.0; controller.feedback.tracked.len()],
             |synthesis| synthesis.state_feedback.spec.output_weight.clone(),
         ),
-        input_weight: vec![INPUT_WEIGHT; controller.input_limits.len()],
+        input_weight: vec![input_weight; controller.input_limits.len()],
         limits: controller.input_limits.clone(),
         noise: design.scenario.noise.clone(),
         disturbance: vec![1.0; design.scenario.disturbance.len()],
-        horizon: HORIZON,
+        horizon,
     };
     let mut predictive = Predictive::new(&controller.plant, &spec, plant.initial_state().mode)?;
     Ok(run_with(plant, &mut predictive, Variant::Predictive, false))

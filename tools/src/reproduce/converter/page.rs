@@ -275,7 +275,8 @@ fn notes(trials: &[Trial]) -> Vec<String> {
     }
     notes.push(
         "The load doubles at the very instant of a step of the voltage’s reference. For the response length after it \
-         no residual means anything and the last estimate is held; a fault that comes or goes in that time costs most."
+         no residual means anything: the last estimate is held as long as it agrees with the linear model, and then the \
+         model alone carries the loop. There the proposed controller loses most of what it loses."
             .into(),
     );
     notes

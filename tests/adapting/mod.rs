@@ -1,0 +1,116 @@
+//! Loops with and without adaptation, on plants that may have changed, under random faults.
+#![allow(dead_code, missing_docs)]
+
+use crate::random_plants::{Dice, design};
+use ftc::control::Controller;
+use ftc::design::Design;
+use ftc::simulate::scenario::{FaultEvent, FaultKind, ModeInterval};
+use ftc::simulate::{PlantSimulator, Trajectory, Truth, Variant, run};
+
+pub const STEPS: u64 = 6000;
+
+/// Six faults of random kind, sensor, size and time.
+pub fn with_faults(design: &mut Design, dice: &mut Dice) {
+    let te = design.controller.plant.sample_time;
+    let sensors = design.controller.estimator.thresholds.len();
+    design.scenario.steps = STEPS;
+    design.scenario.schedule = (0..3)
+        .map(|k| ModeInterval {
+            from: 2000.0 * f64::from(k) * te,
+            mode: (k % 2) as usize,
+        })
+        .collect();
+    design.scenario.events = (0..6)
+        .map(|_| {
+            let sensor = dice.count(0, sensors - 1);
+            let size = design.controller.estimator.thresholds[sensor] * dice.between(-20.0, 20.0);
+            let from = dice.between(600.0, 5400.0);
+            let kind = match dice.count(0, 3) {
+                0 => FaultKind::Bias { size },
+                1 => FaultKind::Drift {
+                    slope: size / (100.0 * te),
+                },
+                2 => FaultKind::Intermittent {
+                    size,
+                    period: 50.0 * te,
+                },
+                _ => FaultKind::Dropout,
+            };
+            FaultEvent {
+                sensor,
+                from: from * te,
+                until: (from + dice.between(50.0, 600.0)) * te,
+                kind,
+            }
+        })
+        .collect();
+}
+
+/// The loop's run with or without adaptation.
+pub fn play(design: &Design, adapt: bool, variant: Variant) -> Trajectory {
+    let mut parameters = design.controller.clone();
+    parameters.estimator.adapt = adapt;
+    let plant = PlantSimulator::with_truth(
+        parameters.plant.clone(),
+        design.truth.clone(),
+        design.scenario.clone(),
+    );
+    run(&plant, &Controller::new(parameters), variant)
+}
+
+/// Sum of the true mean square errors.
+pub fn error(design: &Design, run: &Trajectory) -> f64 {
+    let tracked = &design.controller.feedback.tracked;
+    run.merits(tracked).iter().map(|m| m.truth.mse).sum()
+}
+
+/// Plays a design with and without adaptation and returns the ratio of the errors.
+pub fn ratio(design: &Design) -> f64 {
+    let [adapted, fixed] = [true, false].map(|adapt| {
+        let run = play(design, adapt, Variant::Ftc);
+        let outputs = run.records.iter().flat_map(|r| &r.y_true);
+        let largest = outputs.fold(0.0_f64, |a, y| a.max(y.abs()));
+        assert!(largest < 1e3, "diverges to {largest}");
+        error(design, &run)
+    });
+    adapted / fixed
+}
+
+/// Changes the gains of all inputs of the true plant by a factor.
+pub fn change_gains(design: &mut Design, factor: f64) {
+    let mut plant = design.controller.plant.clone();
+    for mode in &mut plant.modes {
+        mode.b *= factor;
+    }
+    design.truth = Truth::Linear { plant };
+}
+
+/// Whether the loop itself bears the change: the same gains told the fault do as well as before.
+pub fn bears(design: &Design) -> bool {
+    let unchanged = Design {
+        truth: Truth::AsDesigned,
+        ..design.clone()
+    };
+    let [changed, before] = [design, &unchanged]
+        .map(|design| error(design, &play(design, false, Variant::ToldTheFault)));
+    changed < 1.2 * before
+}
+
+/// Widens or narrows every threshold.
+pub fn scale_thresholds(design: &mut Design, factor: f64) {
+    for threshold in &mut design.controller.estimator.thresholds {
+        *threshold *= factor;
+    }
+}
+
+/// A random plant whose input gains are off by `gain`, with thresholds opened tenfold and faults of up to
+/// `largest` thresholds; none where the loop itself does not bear the change.
+pub fn changed_plant(dice: &mut Dice, gain: f64, largest: f64) -> Option<Design> {
+    let mut design = design(dice);
+    // Faults are drawn up to twenty thresholds.
+    scale_thresholds(&mut design, largest / 2.0);
+    with_faults(&mut design, dice);
+    scale_thresholds(&mut design, 20.0 / largest);
+    change_gains(&mut design, gain);
+    bears(&design).then_some(design)
+}
