@@ -162,7 +162,7 @@ class Estimator:
     @property
     def predicting(self) -> bool:
         """Whether the prediction may stand in for a lost sensor."""
-        return self.enabled and self.hold == 0
+        return self.enabled and self.judging
 
     def _wave(self, tick: int) -> np.ndarray:
         harmonics = self.settings["harmonics"]
@@ -388,7 +388,7 @@ class Loop:
             fault = self.trusted_fault(variant, estimator.f_hat, sensors.fault)
             believed = heard if variant == "ftc" else y
             y_c = np.where(np.isfinite(believed), believed - fault, substitute)
-            holding = estimator.enabled and not estimator.judging
+            holding = estimator.enabled and not estimator.predicting
             if variant == "ftc" and holding:
                 modelled = self.modes[mode].C @ model_run + self.modes[mode].c
                 far = np.abs(y_c - modelled) > 4.0 * np.array(estimator.settings["thresholds"])

@@ -198,7 +198,7 @@ impl EstimatorState {
 
     /// Whether the prediction can be used in place of a measurement now.
     pub fn can_predict(&self, estimator: &Estimator) -> bool {
-        estimator.method == EstimatorMethod::Reference && self.hold == 0
+        estimator.method == EstimatorMethod::Reference && self.judged
     }
 
     /// Whether the last sample could not be judged, so that estimates stand still.
