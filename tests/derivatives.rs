@@ -263,7 +263,7 @@ fn compare(simulator: &PlantSimulator, u: [f64; 2], mode: Option<usize>, step: f
                     (false, whole) => {
                         if whole {
                             simulator.observe(&mut trial, &external);
-                            simulator.advance(&mut trial, &u);
+                            simulator.advance(&mut trial, &u).unwrap();
                         }
                         simulator.observe(&mut trial, &external);
                     }
@@ -293,7 +293,7 @@ fn compare(simulator: &PlantSimulator, u: [f64; 2], mode: Option<usize>, step: f
             noise: true,
         };
         simulator.observe(&mut state, &external);
-        simulator.advance(&mut state, &u);
+        simulator.advance(&mut state, &u).unwrap();
     }
 }
 
@@ -310,4 +310,11 @@ fn the_plant_follows_its_inputs() {
 fn the_rectifier_follows_its_inputs() {
     let (simulator, u) = rectifier();
     compare(&simulator, u, None, 1e-2, 1e-5);
+}
+
+/// The link is emptied until its diodes conduct.
+#[test]
+fn the_rectifier_follows_its_inputs_on_its_diodes() {
+    let (simulator, _) = rectifier();
+    compare(&simulator, [-30.0, 5.0], None, 1e-2, 1e-5);
 }

@@ -47,7 +47,7 @@ pub enum Compensate<'a> {
     Nothing,
     /// The estimate `f_hat`.
     Estimate,
-    /// The true fault (p), which only a simulation can know: the bound no estimator can beat.
+    /// The true fault (p), which only a simulation can know: what a perfect estimate would give.
     Known(&'a [f64]),
 }
 

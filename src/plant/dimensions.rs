@@ -54,8 +54,12 @@ impl Dimensions {
             ];
             for (name, matrix, (rows, columns)) in matrices {
                 if matrix.shape() != (rows, columns) {
+                    let reason = match index {
+                        0 => format!("with A of {n} x {n} it has to be"),
+                        _ => "mode 1 makes it".into(),
+                    };
                     return Err(format!(
-                        "mode {number}: {name} is {} x {}, but mode 1 makes it {rows} x {columns}",
+                        "mode {number}: {name} is {} x {}, but {reason} {rows} x {columns}",
                         matrix.nrows(),
                         matrix.ncols()
                     ));

@@ -4,15 +4,27 @@
 //!
 //! ```text
 //! tau di_d/dt = i_d* - i_d          tau di_q/dt = i_q* - i_q
-//! C v dv/dt   = 3/2 (V i_d - R (i_d^2 + i_q^2)) - 3/2 L (i_d di_d/dt + i_q di_q/dt) - v^2/R_load - v i_w
+//! C dv/dt     = p / max(v, v_0) + i_0(v) - v/R_load - i_w
+//! p           = 3/2 (V i_d - R (i_d^2 + i_q^2)) - 3/2 L (i_d di_d/dt + i_q di_q/dt)
 //! ```
+//!
+//! Below the line-to-line peak `v_0 = sqrt(3) V` a bridge is no longer a boost rectifier. Its diodes
+//! conduct and hold the link up with the current `i_0`, that of a six-pulse rectifier behind the
+//! resistance of two lines: zero at the peak, and on the average voltage of the six pulses
+//! `3/pi v_0` far below it. And the bridge cannot put out the voltage that its current control asks
+//! for, only the share `v/v_0` of it, so only that share of the power `p` passes. Hence `v` nowhere
+//! meets a singularity, and energy is conserved everywhere.
 //!
 //! State `x = [i_d, i_q, v]` (A, A, V), input `u = [i_d*, i_q*]` (A), output `y = [v, i_q]`,
 //! disturbance `i_w`: the current of a pulsating load (A). One mode per load resistance.
 
 use super::{Mode, OperatingPoint, SwitchedPlant};
+use core::f64::consts::PI;
 use nalgebra::DMatrix;
 use serde::{Deserialize, Serialize};
+
+/// `sqrt(3)`, a line-to-line voltage over that of a phase.
+const SQRT_3: f64 = 1.732_050_807_568_877_2;
 
 /// Physical parameters, SI units.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -50,9 +62,10 @@ impl Rectifier {
         let rate_d = (u[0] - i_d) / self.current_loop;
         let rate_q = (u[1] - i_q) / self.current_loop;
         let drawn = self.drawn_power(x);
-        let into_coils = 1.5 * self.inductance * (i_d * rate_d + i_q * rate_q);
+        let into_coils = self.coil_power(x, u);
         let load = self.loads.get(mode).copied().unwrap_or(f64::INFINITY);
-        let rate_v = ((drawn - into_coils) / v - v / load - w) / self.capacitance;
+        let from_bridge = (drawn - into_coils) / v.max(self.diode_voltage());
+        let rate_v = (from_bridge + self.diode_current(v) - v / load - w) / self.capacitance;
         [rate_d, rate_q, rate_v]
     }
 
@@ -73,10 +86,57 @@ impl Rectifier {
         let into_coils = 1.5
             * self.inductance
             * (di_d * rate_d + i_d * change_d + di_q * rate_q + i_q * change_q);
-        let stored = self.drawn_power(x) - 1.5 * self.inductance * (i_d * rate_d + i_q * rate_q);
         let load = self.loads.get(mode).copied().unwrap_or(f64::INFINITY);
-        let change_v = (drawn - into_coils) / v - stored * dv / (v * v) - dv / load - dw;
+        let floor = self.diode_voltage();
+        let of_voltage = if v > floor {
+            -(self.drawn_power(x) - self.coil_power(x, u)) / (v * v)
+        } else {
+            self.diode_slope(v)
+        };
+        let change_v = (drawn - into_coils) / v.max(floor) + of_voltage * dv - dv / load - dw;
         [change_d, change_q, change_v / self.capacitance]
+    }
+
+    /// The link voltage (V) below which the diodes conduct: the line-to-line peak `sqrt(3) V`.
+    pub fn diode_voltage(&self) -> f64 {
+        SQRT_3 * self.phase_voltage
+    }
+
+    /// The current (A) that the diodes feed into a link at voltage `v`: `d^2 / (2 R (d + s))`, where
+    /// `d` is what `v` lacks of the peak and `s` what the average of six pulses lacks of it.
+    pub fn diode_current(&self, v: f64) -> f64 {
+        let lacking = (self.diode_voltage() - v).max(0.0);
+        lacking * lacking / (2.0 * self.resistance * (lacking + self.ripple()))
+    }
+
+    /// Its derivative by `v`, in A/V.
+    fn diode_slope(&self, v: f64) -> f64 {
+        let lacking = (self.diode_voltage() - v).max(0.0);
+        let ripple = self.ripple();
+        let whole = lacking + ripple;
+        -lacking * (whole + ripple) / (2.0 * self.resistance * whole * whole)
+    }
+
+    /// By how much the average of six pulses lies below their peak, in V.
+    fn ripple(&self) -> f64 {
+        (1.0 - 3.0 / PI) * self.diode_voltage()
+    }
+
+    /// Power that the coils take up, in W.
+    fn coil_power(&self, x: &RectifierState, u: [f64; 2]) -> f64 {
+        let [i_d, i_q, _] = *x;
+        let rate_d = (u[0] - i_d) / self.current_loop;
+        let rate_q = (u[1] - i_q) / self.current_loop;
+        1.5 * self.inductance * (i_d * rate_d + i_q * rate_q)
+    }
+
+    /// Power that coils, capacitor and loads get from the grid, losses in lines and diodes taken
+    /// off, in W.
+    pub fn supplied_power(&self, x: &RectifierState, u: [f64; 2]) -> f64 {
+        let v = x[2];
+        let coils = self.coil_power(x, u);
+        let share = v / v.max(self.diode_voltage());
+        coils + (self.drawn_power(x) - coils) * share + v * self.diode_current(v)
     }
 
     /// Power taken from the grid less the loss in the line, in W.
@@ -118,8 +178,16 @@ impl Rectifier {
     /// for an input held over `sample_time` seconds.
     ///
     /// # Errors
-    /// The grid cannot supply a load.
+    /// The grid cannot supply a load, or the DC voltage is one that the diodes hold up.
     pub fn linearise(&self, sample_time: f64) -> Result<SwitchedPlant, String> {
+        if self.dc_voltage <= self.diode_voltage() {
+            return Err(format!(
+                "dc_voltage is {} V, but the diodes hold the link at sqrt(3) times phase_voltage, {:.1} V: \
+                 give a dc_voltage above it",
+                self.dc_voltage,
+                self.diode_voltage()
+            ));
+        }
         let modes = (0..self.loads.len())
             .map(|mode| {
                 let point = self.operating_point(mode)?;
@@ -206,7 +274,7 @@ mod tests {
         let start = [9.7, 0.0, 600.0];
         let mut z = [start[0], start[1], start[2], 0.0];
         for _ in 0..40 {
-            integrate::advance(&mut z, 5e-3, tolerance, balance);
+            integrate::advance(&mut z, 5e-3, tolerance, balance).unwrap();
             let gained = plant.stored_energy(&[z[0], z[1], z[2]]) - plant.stored_energy(&start);
             assert!(
                 (gained - z[3]).abs() < 1e-6 * plant.stored_energy(&start),
@@ -219,6 +287,63 @@ mod tests {
             "the trajectory must move: {}",
             z[2]
         );
+    }
+
+    /// However hard the link is emptied into the grid, the diodes hold it up, and the energy that
+    /// they bring is accounted for.
+    #[test]
+    fn the_diodes_hold_the_link_up() {
+        let plant = rectifier();
+        let tolerance = Tolerance {
+            relative: 1e-10,
+            absolute: 1e-10,
+        };
+        let u = [-40.0, 40.0];
+        let load = plant.loads[1];
+        let balance = |z: &[f64; 4]| {
+            let x = [z[0], z[1], z[2]];
+            let [d, q, v] = plant.derivative(1, &x, u, 1.5);
+            [
+                d,
+                q,
+                v,
+                plant.supplied_power(&x, u) - x[2] * x[2] / load - 1.5 * x[2],
+            ]
+        };
+        let start = [20.0, 0.0, 600.0];
+        let mut z = [start[0], start[1], start[2], 0.0];
+        for _ in 0..100 {
+            integrate::advance(&mut z, 5e-3, tolerance, balance).unwrap();
+            let gained = plant.stored_energy(&[z[0], z[1], z[2]]) - plant.stored_energy(&start);
+            assert!((gained - z[3]).abs() < 1e-6 * plant.stored_energy(&start));
+        }
+        let floor = plant.diode_voltage();
+        assert!((0.85 * floor..floor).contains(&z[2]), "{} V", z[2]);
+        let fed = z[2] * plant.diode_current(z[2]);
+        let taken = -plant.drawn_power(&[z[0], z[1], z[2]]) * z[2] / floor;
+        assert!((fed - taken - z[2] * (z[2] / load + 1.5)).abs() < 1e-6 * fed);
+    }
+
+    /// Far below the peak the diodes are the textbook's bridge: the average of six pulses behind
+    /// two lines.
+    #[test]
+    fn a_loaded_bridge_gives_the_average_of_six_pulses() {
+        let plant = rectifier();
+        let average = 3.0 * SQRT_3 / PI * plant.phase_voltage;
+        let (v, two_lines) = (0.3 * average, 2.0 * plant.resistance);
+        let current = plant.diode_current(v);
+        assert!((current * two_lines / (average - v) - 1.0).abs() < 0.01);
+        assert_eq!(plant.diode_current(plant.diode_voltage()), 0.0);
+    }
+
+    #[test]
+    fn a_link_below_the_peak_is_no_boost_rectifier() {
+        let plant = Rectifier {
+            dc_voltage: 500.0,
+            ..rectifier()
+        };
+        let message = plant.linearise(5e-3).unwrap_err();
+        assert!(message.contains("538.7"), "{message}");
     }
 
     /// A small deviation evolves as the linearisation says.
@@ -237,7 +362,8 @@ mod tests {
         let u = [point.u[0] + small, point.u[1] + small];
         integrate::advance(&mut x, 5e-3, tolerance, |x| {
             plant.derivative(1, x, u, small)
-        });
+        })
+        .unwrap();
         let step = &mode.b * nalgebra::DVector::from_element(2, small)
             + &mode.e * nalgebra::DVector::from_element(1, small);
         for row in 0..3 {

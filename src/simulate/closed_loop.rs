@@ -13,7 +13,8 @@ pub enum Variant {
     Ftc,
     /// The same gains, believing every sensor.
     NoFtc,
-    /// The same gains, told the true fault: the bound of any estimator.
+    /// The same gains, told the true fault: what a perfect estimate of it would give. One that also
+    /// takes up disturbance or noise may do better.
     ToldTheFault,
     /// The additive FTC of the paper's section III: gains of Theorem 1, no attenuation.
     Additive,
@@ -102,6 +103,9 @@ pub struct Trajectory {
     pub variant: Variant,
     /// One record per sample.
     pub records: Vec<Record>,
+    /// The first tick, if any, that the plant's equations could not be integrated through; what
+    /// follows it means nothing.
+    pub stalled: Option<u64>,
 }
 
 /// Figures of merit of one tracked output.
@@ -188,6 +192,7 @@ pub fn run_with(
         noise: true,
     };
     let mut records = Vec::with_capacity(plant.scenario().steps as usize);
+    let mut stalled = None;
     for _ in 0..plant.scenario().steps {
         plant.observe(&mut state, &external);
         regulator.tick(&state);
@@ -196,10 +201,17 @@ pub fn run_with(
             acting.copy_from_slice(regulator.command());
         }
         regulator.advance(&state, &acting);
-        plant.advance(&mut state, &acting);
+        let tick = state.tick;
+        if plant.advance(&mut state, &acting).is_err() {
+            stalled = stalled.or(Some(tick));
+        }
         acting.copy_from_slice(regulator.command());
     }
-    Trajectory { variant, records }
+    Trajectory {
+        variant,
+        records,
+        stalled,
+    }
 }
 
 fn record(plant: &PlantState, regulator: &dyn Regulator) -> Record {
@@ -223,14 +235,17 @@ fn record(plant: &PlantState, regulator: &dyn Regulator) -> Record {
 }
 
 impl Trajectory {
-    /// Figures of merit of each tracked output (rows of `tracked`, 0-based).
+    /// Figures of merit of each tracked output (rows of `tracked`, 0-based), as far as the plant could
+    /// be integrated.
     pub fn merits(&self, tracked: &[usize]) -> Vec<Merits> {
         tracked
             .iter()
             .enumerate()
             .map(|(index, &row)| {
+                let sound = |record: &&Record| self.stalled.is_none_or(|end| record.tick <= end);
                 let column = |pick: &dyn Fn(&Record) -> f64| {
-                    self.records.iter().map(pick).collect::<Vec<f64>>()
+                    let records = self.records.iter().take_while(sound);
+                    records.map(pick).collect::<Vec<f64>>()
                 };
                 let reference = column(&|r| r.reference[index]);
                 Merits {

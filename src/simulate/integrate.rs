@@ -1,7 +1,7 @@
 //! Dormand-Prince 5(4) with error control, on the stack: a nonlinear plant's own integrator.
 //!
 //! The step is chosen from the embedded error estimate alone, so the same inputs give the same
-//! bits; nothing is allocated.
+//! bits; nothing is allocated. What cannot be integrated that accurately is refused, not guessed.
 
 /// Relative and absolute error allowed per step.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -51,27 +51,34 @@ const ERROR: [f64; 7] = [
     -1.0 / 40.0,
 ];
 
-/// The most steps one call may take before it accepts whatever error is left.
+/// The most steps one call may try.
 const MOST_STEPS: usize = 10_000;
 
+/// The tolerance was not met in as many steps as are allowed: the equations have no solution there
+/// (a singularity), or change faster than anything meant to be simulated.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Stalled;
+
 /// Advances `state` under `derivative` by `duration` seconds.
+///
+/// # Errors
+/// [`Stalled`] where the tolerance cannot be met; `state` is then where it was met last.
 pub fn advance<const N: usize>(
     state: &mut [f64; N],
     duration: f64,
     tolerance: Tolerance,
     derivative: impl Fn(&[f64; N]) -> [f64; N],
-) {
-    let shortest = duration / MOST_STEPS as f64;
+) -> Result<(), Stalled> {
     let mut left = duration;
     let mut step = duration / 8.0;
-    while left > 0.0 {
-        step = step.clamp(shortest, left.max(shortest)).min(left);
+    for _ in 0..MOST_STEPS {
+        step = step.min(left);
         let (next, error) = attempt(state, step, tolerance, &derivative);
-        if error <= 1.0 || step <= shortest {
+        if error <= 1.0 {
             *state = next;
             left -= step;
             if left <= 1e-12 * duration {
-                return;
+                return Ok(());
             }
         }
         let factor = if error > 0.0 {
@@ -81,9 +88,11 @@ pub fn advance<const N: usize>(
         };
         step *= factor.clamp(0.2, 5.0);
     }
+    Err(Stalled)
 }
 
-/// One step: the fifth-order result and the error in units of the tolerance.
+/// One step: the fifth-order result and the error in units of the tolerance, infinite where the
+/// result is no number.
 fn attempt<const N: usize>(
     state: &[f64; N],
     step: f64,
@@ -111,7 +120,8 @@ fn attempt<const N: usize>(
     let mut worst: f64 = 0.0;
     for ((&old, &new), estimate) in state.iter().zip(&point).zip(estimates) {
         let allowed = tolerance.absolute + tolerance.relative * old.abs().max(new.abs());
-        worst = worst.max((step * estimate).abs() / allowed);
+        let error = (step * estimate).abs() / allowed;
+        worst = worst.max(if error.is_nan() { f64::INFINITY } else { error });
     }
     (point, worst)
 }
@@ -128,7 +138,7 @@ mod tests {
         };
         let mut state = [1.0, 0.0];
         for _ in 0..100 {
-            advance(&mut state, 0.1, tolerance, |s| [s[1], -s[0]]);
+            advance(&mut state, 0.1, tolerance, |s| [s[1], -s[0]]).unwrap();
         }
         assert!((state[0] - 10f64.cos()).abs() < 1e-7 && (state[1] + 10f64.sin()).abs() < 1e-7);
     }
@@ -146,7 +156,8 @@ mod tests {
                     absolute: relative,
                 },
                 van_der_pol,
-            );
+            )
+            .unwrap();
             let mut exact = [2.0, 0.0];
             advance(
                 &mut exact,
@@ -156,10 +167,37 @@ mod tests {
                     absolute: 1e-12,
                 },
                 van_der_pol,
-            );
+            )
+            .unwrap();
             (state[0] - exact[0]).abs()
         };
         assert!(error(1e-6) < 1e-4);
         assert!(error(1e-9) < 1e-7);
+    }
+
+    /// `x' = x^2` from 1 is `1 / (1 - t)`: there is nothing after t = 1.
+    #[test]
+    fn nothing_is_integrated_through_a_singularity() {
+        let tolerance = Tolerance {
+            relative: 1e-9,
+            absolute: 1e-9,
+        };
+        let square = |s: &[f64; 1]| [s[0] * s[0]];
+        let mut state = [1.0];
+        advance(&mut state, 0.5, tolerance, square).unwrap();
+        assert!((state[0] - 2.0).abs() < 1e-7);
+        assert_eq!(advance(&mut state, 1.0, tolerance, square), Err(Stalled));
+        assert!(state[0] >= 2.0);
+    }
+
+    #[test]
+    fn what_is_no_number_is_not_accepted() {
+        let tolerance = Tolerance {
+            relative: 1e-9,
+            absolute: 1e-9,
+        };
+        let mut state = [1.0, 2.0];
+        let result = advance(&mut state, 1.0, tolerance, |s| [f64::NAN, s[0]]);
+        assert_eq!((result, state), (Err(Stalled), [1.0, 2.0]));
     }
 }

@@ -4,6 +4,7 @@ mod derivative;
 
 pub use derivative::Change;
 
+use super::integrate::Stalled;
 use super::noise;
 use super::scenario::{FaultEvent, Scenario};
 use super::truth::{self, Truth};
@@ -206,8 +207,12 @@ impl PlantSimulator {
     }
 
     /// Moves to the next tick under input `u` (m), held over the sample.
-    pub fn advance(&self, state: &mut PlantState, u: &[f64]) {
-        match &self.truth {
+    ///
+    /// # Errors
+    /// [`Stalled`] where the nonlinear plant cannot be integrated; the tick then ends where that
+    /// became so, and later ticks go on from there.
+    pub fn advance(&self, state: &mut PlantState, u: &[f64]) -> Result<(), Stalled> {
+        let result = match &self.truth {
             Truth::Rectifier(rectifier) => truth::advance_rectifier(
                 rectifier,
                 state.mode,
@@ -216,10 +221,14 @@ impl PlantSimulator {
                 &state.disturbance,
                 self.plant.sample_time,
             ),
-            Truth::AsDesigned | Truth::Linear { .. } => self.advance_linear(state, u),
-        }
+            Truth::AsDesigned | Truth::Linear { .. } => {
+                self.advance_linear(state, u);
+                Ok(())
+            }
+        };
         kernel::bound(&mut state.x);
         state.tick = state.tick.saturating_add(1);
+        result
     }
 
     fn advance_linear(&self, state: &mut PlantState, u: &[f64]) {
@@ -341,14 +350,14 @@ mod tests {
             let mut state = PlantState { tick: 3, mode, x, y, y_true, fault, disturbance, reference, noise, last, next };
             let (u, f, w) = (vec![1.0; m], vec![1.0; p], vec![1.0; s]);
             let external = External { fault: &f, disturbance: &w, mode: given, noise: true };
-            simulator.advance(&mut state, &u);
+            simulator.advance(&mut state, &u).unwrap();
             let mut trial = state.clone();
             let change = Change { command: &u, fault: &f, disturbance: &w };
             simulator.differentiate_outputs(&mut trial, &external, &change);
             trial.mode = mode;
             simulator.differentiate_tick(&mut trial, &external, &u, &change);
             simulator.observe(&mut state, &external);
-            simulator.advance(&mut state, &u);
+            simulator.advance(&mut state, &u).unwrap();
         }
     }
 }

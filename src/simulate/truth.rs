@@ -1,6 +1,6 @@
 //! What the simulated plant really is, as opposed to what the controller was designed for.
 
-use super::integrate::{self, Tolerance};
+use super::integrate::{self, Stalled, Tolerance};
 use crate::control::kernel;
 use crate::plant::SwitchedPlant;
 use crate::plant::rectifier::Rectifier;
@@ -39,6 +39,9 @@ impl Truth {
 }
 
 /// Moves the rectifier's state `x` over one sample under held `u` and `w`.
+///
+/// # Errors
+/// [`Stalled`]; `x` is then as far as it came.
 pub(super) fn advance_rectifier(
     rectifier: &Rectifier,
     mode: usize,
@@ -46,16 +49,17 @@ pub(super) fn advance_rectifier(
     u: &[f64],
     w: &[f64],
     sample_time: f64,
-) {
+) -> Result<(), Stalled> {
     let (&[i_d, i_q, v], &[u_d, u_q]) = (&*x, u) else {
-        return;
+        return Ok(());
     };
     let load_current = w.first().copied().unwrap_or(0.0);
     let mut state = [i_d, i_q, v];
-    integrate::advance(&mut state, sample_time, ACCURACY, |x| {
+    let result = integrate::advance(&mut state, sample_time, ACCURACY, |x| {
         rectifier.derivative(mode, x, [u_d, u_q], load_current)
     });
     kernel::copy(x, &state);
+    result
 }
 
 /// A signal held over a sample, and its change.
@@ -68,7 +72,8 @@ pub(super) struct Held<'a> {
 }
 
 /// The change of the rectifier's state after one sample from `x`, by its variational equation
-/// `d(dx)/dt = J(x, u, w) (dx, du, dw)`, integrated together with the state.
+/// `d(dx)/dt = J(x, u, w) (dx, du, dw)`, integrated together with the state; where that stalls, as
+/// far as it came.
 pub(super) fn differentiate_rectifier(
     rectifier: &Rectifier,
     mode: usize,
@@ -82,7 +87,7 @@ pub(super) fn differentiate_rectifier(
     };
     let [w, dw] = held.disturbance.map(|w| w.first().copied().unwrap_or(0.0));
     let mut both = [i_d, i_q, v, 0.0, 0.0, 0.0];
-    integrate::advance(
+    let _ = integrate::advance(
         &mut both,
         sample_time,
         ACCURACY,

@@ -4,6 +4,7 @@ use crate::archive::{self, Contents};
 use crate::certificate::{self, Certificate};
 use crate::documentation;
 use crate::output::Staging;
+use crate::platform::{PLATFORMS, Platform};
 use crate::ssp::{self, Component, System};
 use ftc::design::Design;
 use ftc::simulate::Trajectory;
@@ -15,17 +16,18 @@ use std::path::{Path, PathBuf};
 use std::time::SystemTime;
 
 /// One of the two FMUs.
-struct Kind {
+pub struct Kind {
     /// Ends the FMU's name.
     suffix: &'static str,
     /// Name of the generic binary, and the fingerprint's identifier.
-    binary: &'static str,
+    pub binary: &'static str,
     /// One line for the description.
     description: &'static str,
     table: fn(&Interface) -> VariableTable,
 }
 
-const KINDS: [Kind; 2] = [
+/// Both FMUs of a design.
+pub const KINDS: [Kind; 2] = [
     Kind {
         suffix: "controller",
         binary: CONTROLLER,
@@ -37,29 +39,6 @@ const KINDS: [Kind; 2] = [
         binary: PLANT,
         description: "Switched plant with its scenario: reference, modes, sensor faults, disturbance, noise",
         table: model_description::plant,
-    },
-];
-
-/// A platform for which binaries may have been built.
-struct Platform {
-    /// Directory inside the FMU and beside this program.
-    name: &'static str,
-    /// Extension of its shared libraries.
-    extension: &'static str,
-}
-
-const PLATFORMS: [Platform; 3] = [
-    Platform {
-        name: "linux64",
-        extension: "so",
-    },
-    Platform {
-        name: "win64",
-        extension: "dll",
-    },
-    Platform {
-        name: "aarch64-linux",
-        extension: "so",
     },
 ];
 
@@ -126,21 +105,46 @@ pub fn write(design: &Design, staging: Staging, ssp: bool) -> Result<String, Str
     Ok(text)
 }
 
-impl Exporter<'_> {
-    fn identifier(&self, kind: &Kind) -> String {
-        format!("{}_{}", self.design.name, kind.suffix)
+impl Kind {
+    /// The FMU's name, and that of its binaries.
+    pub fn identifier(&self, design: &Design) -> String {
+        format!("{}_{}", design.name, self.suffix)
     }
 
+    /// `modelDescription.xml` of a design whose record has these bytes.
+    ///
+    /// # Errors
+    /// What the XML writer says.
+    pub fn describe(&self, design: &Design, resource: &[u8]) -> Result<String, String> {
+        let identifier = &self.identifier(design);
+        let interface = Interface::from(design);
+        xml::write(&Document {
+            model_name: identifier,
+            model_identifier: identifier,
+            description: self.description,
+            guid: &model_description::guid(self.binary, resource),
+            version: env!("CARGO_PKG_VERSION"),
+            license: env!("CARGO_PKG_LICENSE"),
+            step_size: interface.sample_time,
+            stop_time: interface.stop_time,
+            directional_derivative: true,
+            table: &(self.table)(&interface),
+        })
+        .map_err(|what| format!("{identifier}: {what}"))
+    }
+}
+
+impl Exporter<'_> {
     fn file(&self, kind: &Kind) -> String {
-        format!("{}.fmu", self.identifier(kind))
+        format!("{}.fmu", kind.identifier(self.design))
     }
 
     fn fmu(&self, kind: &Kind) -> Result<Vec<u8>, String> {
-        let identifier = self.identifier(kind);
+        let identifier = kind.identifier(self.design);
         let mut contents = Contents::from([
             (
                 "modelDescription.xml".into(),
-                self.describe(kind, &identifier)?.into_bytes(),
+                kind.describe(self.design, &self.resource)?.into_bytes(),
             ),
             ("model.png".into(), ICON.into()),
             ("resources/design.json".into(), self.resource.clone()),
@@ -152,11 +156,7 @@ impl Exporter<'_> {
             ("documentation/licenses/license.txt".into(), LICENSES.into()),
         ]);
         for binaries in self.binaries.iter().filter(|binaries| !binaries.outdated) {
-            let Platform { name, extension } = binaries.platform;
-            contents.insert(
-                format!("binaries/{name}/{identifier}.{extension}"),
-                binaries.read(kind)?,
-            );
+            contents.insert(binaries.platform.path(&identifier), binaries.read(kind)?);
         }
         archive::zip(&identifier, &contents)
     }
@@ -165,22 +165,6 @@ impl Exporter<'_> {
         let title = format!("{}: {}", self.design.name, kind.suffix);
         let lead = format!("{}.", kind.description);
         documentation::page(self.design, &self.runs, title, lead)
-    }
-
-    fn describe(&self, kind: &Kind, identifier: &str) -> Result<String, String> {
-        xml::write(&Document {
-            model_name: identifier,
-            model_identifier: identifier,
-            description: kind.description,
-            guid: &model_description::guid(kind.binary, &self.resource),
-            version: env!("CARGO_PKG_VERSION"),
-            license: env!("CARGO_PKG_LICENSE"),
-            step_size: self.interface.sample_time,
-            stop_time: self.interface.stop_time,
-            directional_derivative: true,
-            table: &(kind.table)(&self.interface),
-        })
-        .map_err(|what| format!("{identifier}: {what}"))
     }
 
     /// The SSP package: the FMUs under `resources/` beside the description of how they connect.

@@ -50,6 +50,14 @@ struct Row {
     outputs: Vec<f64>,
 }
 
+/// The log of a mode (0-based).
+pub fn file_of(files: &NameOrList, mode: usize) -> &str {
+    match files {
+        NameOrList::Name(file) => file,
+        NameOrList::List(files) => files.get(mode).map_or("", String::as_str),
+    }
+}
+
 /// Which column holds what.
 struct Columns {
     inputs: Vec<usize>,
@@ -87,8 +95,34 @@ impl Logs<'_> {
                 mode + 1,
                 self.plant.modes[mode].name
             )),
-            None => Ok(stretches),
+            None => self.check_alive(files, &stretches).map(|()| stretches),
         }
+    }
+
+    /// Refuses a sensor that says the same throughout a mode.
+    fn check_alive(&self, files: &NameOrList, stretches: &[Vec<Database>]) -> Result<(), String> {
+        let outputs = &self.signals.outputs;
+        for (mode, stretches) in stretches.iter().enumerate() {
+            let samples: usize = stretches.iter().map(Database::samples).sum();
+            let still = |output: &usize| {
+                let columns = stretches.iter().map(|log| log.outputs.column(*output));
+                let [least, most] = columns
+                    .fold([f64::INFINITY, f64::NEG_INFINITY], |ends, values| {
+                        [ends[0].min(values.min()), ends[1].max(values.max())]
+                    });
+                samples > 1 && least == most
+            };
+            if let Some(output) = (0..outputs.len()).find(still) {
+                return Err(format!(
+                    "{}: mode {} ({}): {} never changes: record with a sensor that works",
+                    sentence::shorten(file_of(files, mode)),
+                    mode + 1,
+                    self.plant.modes[mode].name,
+                    outputs[output].name
+                ));
+            }
+        }
+        Ok(())
     }
 
     /// Adds the stretches of one file; all of it belongs to mode `only`, if given.
@@ -145,11 +179,17 @@ impl Logs<'_> {
     /// Finds the column of every signal.
     fn columns(&self, header: &StringRecord) -> Result<Columns, String> {
         let names: Vec<&str> = header.iter().collect();
+        let known: Vec<&str> = [&self.signals.inputs, &self.signals.outputs]
+            .into_iter()
+            .flatten()
+            .map(|signal| signal.name.as_str())
+            .collect();
         let all = |letter: &str, signals: &[Signal]| -> Result<Vec<usize>, String> {
             let numbered = signals.iter().enumerate();
             numbered
                 .map(|(index, signal)| {
-                    column(&names, &signal.name, &format!("{letter}[{}]", index + 1))
+                    let number = format!("{letter}[{}]", index + 1);
+                    column(&names, &signal.name, &number, &known)
                 })
                 .collect()
         };
@@ -259,8 +299,9 @@ impl Columns {
     }
 }
 
-/// The column of a signal, under the user's name or under its number.
-fn column(names: &[&str], name: &str, number: &str) -> Result<usize, String> {
+/// The column of a signal, under the user's name or under its number. A column that bears the name
+/// of another signal, among those `known`, was not meant.
+fn column(names: &[&str], name: &str, number: &str, known: &[&str]) -> Result<usize, String> {
     if let Some(at) = once(names, name)?.map_or_else(|| once(names, number), |at| Ok(Some(at)))? {
         return Ok(at);
     }
@@ -273,10 +314,16 @@ fn column(names: &[&str], name: &str, number: &str) -> Result<usize, String> {
         true => name.to_string(),
         false => format!("{name} or {number}"),
     };
-    Err(format!(
-        "has no column {wanted}: {}",
-        suggest::nearest(name, names)
-    ))
+    let free: Vec<&str> = names
+        .iter()
+        .copied()
+        .filter(|name| !known.contains(name))
+        .collect();
+    let advice = match free.is_empty() {
+        true => "add it".into(),
+        false => suggest::nearest(name, &free),
+    };
+    Err(format!("has no column {wanted}: {advice}"))
 }
 
 /// Where a name stands, if it does; refuses a name that stands twice.

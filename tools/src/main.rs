@@ -20,6 +20,7 @@ mod export;
 mod failure;
 mod healthy_log;
 mod output;
+mod platform;
 mod progress;
 mod report;
 mod reproduce;
@@ -27,8 +28,10 @@ mod simulate;
 mod ssp;
 mod summary;
 mod verify;
+mod warnings;
 
 use clap::{Parser, Subcommand};
+use design_file::schema::DesignFile;
 use failure::Failure;
 use ftc::design::Design;
 use ftc::design::assembly::Request;
@@ -57,7 +60,8 @@ Exit codes:
   0  done
   1  there is no such controller: the design is infeasible or could not be certified;
      of verify: the FMU does not hold what it promises
-  2  the command line, a file or the output directory is at fault; nothing was written";
+  2  the command line, a file or the output directory is at fault; nothing was written;
+     or standard output cannot be written to";
 
 #[derive(Subcommand)]
 enum Command {
@@ -83,6 +87,8 @@ enum Command {
     /// Checks that description, design and certificate belong together and that the gains which
     /// run are those that were proved, then proves every inequality with rounding accounted for:
     /// stability under arbitrary switching or beyond a dwell time, decay, and gamma per mode.
+    /// Of the binaries it checks that there is one, and of each the platform and the functions it
+    /// offers; what their machine code does is not proved.
     #[command(after_help = EXIT_CODES)]
     Verify {
         /// FMU that ftc-fmu export wrote.
@@ -109,8 +115,8 @@ enum Command {
     /// Run the design's scenario without any FMU: trajectories.csv, metrics.json, report.html and figures.
     ///
     /// Runs it three times: with fault tolerance (ftc), with the same gains believing every
-    /// sensor (no_ftc), and with the same gains told the true fault (told_the_fault), which no
-    /// estimator can beat.
+    /// sensor (no_ftc), and with the same gains told the true fault (told_the_fault): an estimate
+    /// that is perfect, yet takes up no disturbance and no noise.
     #[command(after_help = EXIT_CODES)]
     Simulate {
         /// Design file (TOML).
@@ -142,18 +148,12 @@ enum Command {
 fn main() -> ExitCode {
     let arguments = Arguments::parse();
     match run(&arguments) {
-        Ok(text) => {
-            if !arguments.quiet {
-                print(&text);
-            }
-            ExitCode::SUCCESS
-        }
+        Ok(_) if arguments.quiet => ExitCode::SUCCESS,
+        Ok(text) => print(&text).map_or_else(unprinted, |()| ExitCode::SUCCESS),
         Err(failure) => {
-            if let Some(text) = failure.output() {
-                print(text);
-            }
+            let printed = failure.output().map_or(Ok(()), print);
             eprintln!("error: {failure}");
-            failure.exit_code()
+            printed.map_or_else(unprinted, |()| failure.exit_code())
         }
     }
 }
@@ -167,21 +167,23 @@ fn run(arguments: &Arguments) -> Result<String, Failure> {
             json,
             as_printed: true,
         } => {
-            let request = read(design, &progress)?;
+            let (_, request) = read(design, &progress)?;
             progress.tell("looking for a margin");
             as_printed::report(design, request, *json)
         }
         Command::Design { design, json, .. } => match (solve(design, &progress), json) {
-            (Ok(design), false) => Ok(summary::text(&design)),
-            (Ok(design), true) => Ok(summary::json(&design)),
+            (Ok(made), false) => Ok(summary::text(&made.design, &made.warnings)),
+            (Ok(made), true) => Ok(summary::json(&made.design, &made.warnings)),
             (Err(failure), false) => Err(failure),
             (Err(failure), true) => Err(failure.explained_in_json()),
         },
         Command::Verify { fmu, json } => verify::run(fmu, *json),
         Command::Export { design, out, ssp } => {
             let staging = output::Staging::new(out).map_err(Failure::Input)?;
-            let design = solve(design, &progress)?;
-            export::write(&design, staging, *ssp).map_err(Failure::Input)
+            let made = solve(design, &progress)?;
+            export::write(&made.design, staging, *ssp)
+                .map(|text| text + &warnings::text(&made.warnings))
+                .map_err(Failure::Input)
         }
         Command::Simulate {
             design,
@@ -189,9 +191,9 @@ fn run(arguments: &Arguments) -> Result<String, Failure> {
             baselines,
         } => {
             let staging = output::Staging::new(out).map_err(Failure::Input)?;
-            let design = solve(design, &progress)?;
+            let made = solve(design, &progress)?;
             progress.tell("simulating");
-            simulate::write(&design, *baselines, staging).map_err(Failure::Input)
+            simulate::write(&made, *baselines, staging).map_err(Failure::Input)
         }
         Command::Reproduce { experiment, out } => {
             let staging = output::Staging::new(out).map_err(Failure::Input)?;
@@ -203,26 +205,45 @@ fn run(arguments: &Arguments) -> Result<String, Failure> {
 }
 
 /// Reads a design file.
-fn read(path: &Path, progress: &Progress) -> Result<Request, Failure> {
+fn read(path: &Path, progress: &Progress) -> Result<(DesignFile, Request), Failure> {
     progress.tell("reading the design file");
     let file = design_file::read(path).map_err(Failure::Input)?;
     let folder = path.parent().unwrap_or(Path::new(""));
     assemble::request(&file, folder)
         .map_err(|what| Failure::Input(format!("{}: {what}", path.display())))
+        .map(|request| (file, request))
+}
+
+/// A design, and what its user should know of it: one sentence each.
+struct Made {
+    design: Design,
+    warnings: Vec<String>,
 }
 
 /// Reads a design file and makes the design.
-fn solve(path: &Path, progress: &Progress) -> Result<Design, Failure> {
-    let request = read(path, progress)?;
+fn solve(path: &Path, progress: &Progress) -> Result<Made, Failure> {
+    let (file, request) = read(path, progress)?;
     let asked = request.control.clone();
+    let logged = warnings::Logged::of(&request.estimator.database);
     progress.tell("solving for gains and certifying them");
-    ftc::design::assembly::assemble(request).map_err(|error| Failure::new(path, asked, error))
+    let design = ftc::design::assembly::assemble(request)
+        .map_err(|error| Failure::new(path, asked, error))?;
+    let warnings = warnings::of_design(&file, logged.as_ref(), &design);
+    Ok(Made { design, warnings })
 }
 
 /// Prints to standard output; a reader that has gone away is no error of ours.
-fn print(text: &str) {
+fn print(text: &str) -> std::io::Result<()> {
     let mut out = std::io::stdout().lock();
-    out.write_all(text.as_bytes())
-        .and_then(|()| out.flush())
-        .ok();
+    let result = out.write_all(text.as_bytes()).and_then(|()| out.flush());
+    match result {
+        Err(error) if error.kind() == std::io::ErrorKind::BrokenPipe => Ok(()),
+        result => result,
+    }
+}
+
+/// What the reader of standard output asked for is lost.
+fn unprinted(error: std::io::Error) -> ExitCode {
+    eprintln!("error: standard output cannot be written to ({error}): send it elsewhere");
+    ExitCode::from(2)
 }

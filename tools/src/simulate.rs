@@ -1,8 +1,10 @@
 //! `simulate`: every variant of the loop natively, written down sample by sample.
 
+use crate::Made;
 use crate::baselines;
 use crate::output::Staging;
 use crate::report;
+use crate::warnings;
 use ftc::control::Controller;
 use ftc::design::Design;
 use ftc::simulate::closed_loop::{Merits, Record};
@@ -15,7 +17,8 @@ use std::fmt::Write;
 ///
 /// # Errors
 /// One sentence about the output directory or a baseline.
-pub fn write(design: &Design, baselines: bool, staging: Staging) -> Result<String, String> {
+pub fn write(made: &Made, baselines: bool, staging: Staging) -> Result<String, String> {
+    let design = &made.design;
     let report = staging.target("report.html");
     let mut trajectories = trajectories(design);
     let mut bound = None;
@@ -23,14 +26,16 @@ pub fn write(design: &Design, baselines: bool, staging: Staging) -> Result<Strin
         trajectories.extend(baselines::trajectories(design, &plant(design))?);
         bound = Some(baselines::bound(design, &trajectories[0]));
     }
+    let mut warnings = made.warnings.clone();
+    warnings.extend(warnings::of_runs(design, &trajectories));
     let csv = table(design, &trajectories).map_err(|error| error.to_string())?;
     staging.add("trajectories.csv", &csv)?;
     staging.add(
         "metrics.json",
-        metrics(design, &trajectories, bound.as_deref()).as_bytes(),
+        metrics(design, &trajectories, bound.as_deref(), &warnings).as_bytes(),
     )?;
-    report::write(design, &trajectories, &staging.folder().join("report.html"))
-        .map_err(|error| format!("{error:#}"))?;
+    let page = staging.folder().join("report.html");
+    report::write(design, &trajectories, &warnings, &page).map_err(|error| format!("{error:#}"))?;
     staging.commit()?;
     let mut text = summary(design, &trajectories, bound.as_deref());
     let _ = writeln!(
@@ -38,6 +43,7 @@ pub fn write(design: &Design, baselines: bool, staging: Staging) -> Result<Strin
         "wrote {}, trajectories.csv, metrics.json and the figures",
         report.display()
     );
+    text.push_str(&warnings::text(&warnings));
     Ok(text)
 }
 
@@ -145,8 +151,13 @@ fn number(value: f64) -> String {
 }
 
 /// Per variant `mse` and `vaf`, each measured and true, one number per tracked output; of the
-/// deadbeat bound the true `mse` alone.
-fn metrics(design: &Design, trajectories: &[Trajectory], bound: Option<&[f64]>) -> String {
+/// deadbeat bound the true `mse` alone. Beside them the `warnings`, one sentence each.
+fn metrics(
+    design: &Design,
+    trajectories: &[Trajectory],
+    bound: Option<&[f64]>,
+    warnings: &[String],
+) -> String {
     let tracked = &design.controller.feedback.tracked;
     let of = |trajectory: &Trajectory| {
         let merits = trajectory.merits(tracked);
@@ -161,6 +172,7 @@ fn metrics(design: &Design, trajectories: &[Trajectory], bound: Option<&[f64]>) 
     if let Some(mse) = bound {
         variants.insert(BOUND.into(), json!({ "mse": { "true": mse } }));
     }
+    variants.insert("warnings".into(), json!(warnings));
     format!("{:#}\n", Value::Object(variants))
 }
 
@@ -182,17 +194,25 @@ fn summary(design: &Design, trajectories: &[Trajectory], bound: Option<&[f64]>) 
         "VAF true %",
     );
     let tracked = &design.controller.feedback.tracked;
+    let mut constant = false;
     for trajectory in trajectories {
-        for (merits, &output) in trajectory.merits(tracked).iter().zip(tracked) {
+        let merits = trajectory.merits(tracked);
+        for (row, (merits, &output)) in merits.iter().zip(tracked).enumerate() {
+            let varies = varies(trajectory, row);
+            constant |= !varies;
+            let vaf = |value: f64| match varies {
+                true => format!("{value:.3}"),
+                false => "-".into(),
+            };
             let _ = writeln!(
                 text,
-                "{:<16}{:<12}{:>14.5e}{:>14.5e}{:>12.3}{:>12.3}",
+                "{:<16}{:<12}{:>14.5e}{:>14.5e}{:>12}{:>12}",
                 trajectory.variant.key(),
                 design.signals.outputs[output].name,
                 merits.measured.mse,
                 merits.truth.mse,
-                merits.measured.vaf,
-                merits.truth.vaf,
+                vaf(merits.measured.vaf),
+                vaf(merits.truth.vaf),
             );
         }
     }
@@ -200,6 +220,21 @@ fn summary(design: &Design, trajectories: &[Trajectory], bound: Option<&[f64]>) 
         let name = &design.signals.outputs[output].name;
         let _ = writeln!(text, "{BOUND:<16}{name:<12}{:>14}{mse:>14.5e}", "");
     }
+    if constant {
+        text.push_str(
+            "\n-: VAF compares variances and means nothing where the reference is constant\n",
+        );
+    }
     text.push('\n');
     text
+}
+
+/// Whether the reference of a tracked output moves at all.
+fn varies(trajectory: &Trajectory, row: usize) -> bool {
+    let mut values = trajectory
+        .records
+        .iter()
+        .map(|record| record.reference[row]);
+    let first = values.next();
+    values.any(|value| Some(value) != first)
 }

@@ -1,13 +1,14 @@
 //! The design report, for a person and for a program.
 
 use crate::report::text::count;
+use crate::warnings;
 use ftc::control::parameters::{EstimatorMethod, ObserverKind};
 use ftc::design::{ControlSpec, Design, DesignError, ObserverDesign, Signal, StateFeedback};
 use serde_json::{Value, json};
 use std::fmt::Write;
 
 /// The report a person reads.
-pub fn text(design: &Design) -> String {
+pub fn text(design: &Design, warnings: &[String]) -> String {
     let mut text = String::new();
     for (title, lines) in sections(design) {
         let _ = writeln!(text, "{title}");
@@ -16,7 +17,7 @@ pub fn text(design: &Design) -> String {
         }
         text.push('\n');
     }
-    text
+    text + &warnings::text(warnings)
 }
 
 /// A titled list of named values.
@@ -224,7 +225,7 @@ fn with_units(values: &[f64], signals: &[Signal]) -> String {
 }
 
 /// The report a program reads.
-pub fn json(design: &Design) -> String {
+pub fn json(design: &Design, warnings: &[String]) -> String {
     let estimator = &design.controller.estimator;
     let control = design
         .synthesis
@@ -260,6 +261,7 @@ pub fn json(design: &Design) -> String {
             "debounce": estimator.debounce,
             "stuck_after": estimator.stuck_after,
         },
+        "warnings": warnings,
     });
     pretty(&value)
 }

@@ -1,7 +1,9 @@
 //! `verify`: proves again, from the doubles an FMU ships, what it promises. Nothing is solved.
 
 use crate::certificate::{self, Certificate, Promise};
+use crate::export::{KINDS, Kind};
 use crate::failure::Failure;
+use crate::platform::PLATFORMS;
 use crate::summary;
 use ftc::design::Design;
 use roxmltree::Document;
@@ -57,7 +59,10 @@ fn contents(path: &Path) -> Result<BTreeMap<String, Vec<u8>>, Refusal> {
     }
     let damaged =
         |what: String| Unreadable(format!("the archive is damaged ({what}): export it again"));
-    let mut archive = ZipArchive::new(file).map_err(|error| damaged(error.to_string()))?;
+    let mut archive = ZipArchive::new(file).map_err(|error| match is_zip(path) {
+        true => damaged(error.to_string()),
+        false => Unreadable("this is no FMU: name one that ftc-fmu export wrote".into()),
+    })?;
     let mut files = BTreeMap::new();
     for index in 0..archive.len() {
         let mut entry = archive
@@ -79,6 +84,15 @@ fn contents(path: &Path) -> Result<BTreeMap<String, Vec<u8>>, Refusal> {
     Ok(files)
 }
 
+/// Whether a file begins as zip archives do.
+fn is_zip(path: &Path) -> bool {
+    let mut magic = [0; 2];
+    File::open(path)
+        .and_then(|mut file| file.read_exact(&mut magic))
+        .is_ok()
+        && &magic == b"PK"
+}
+
 /// An unpacked FMU.
 struct Fmu {
     files: BTreeMap<String, Vec<u8>>,
@@ -87,7 +101,7 @@ struct Fmu {
 impl Fmu {
     fn verify(&self) -> Result<Certified, Refusal> {
         let bytes = self.file(DESIGN)?;
-        self.check_guid(bytes)?;
+        let kind = self.kind(bytes)?;
         let design: Design = parse(DESIGN, bytes)?;
         design.check().map_err(Unproved)?;
         let shipped: Certificate = parse(certificate::PATH, self.file(certificate::PATH)?)?;
@@ -100,9 +114,12 @@ impl Fmu {
                 .verify(&design.controller.plant)
                 .map_err(|error| Unproved(format!("{error}: export the design again")))?;
         }
+        self.check_description(kind, &design, bytes)?;
+        let platforms = self.check_binaries(&kind.identifier(&design))?;
         Ok(Certified {
             design,
             certificate: shipped,
+            platforms,
         })
     }
 
@@ -114,22 +131,64 @@ impl Fmu {
         })
     }
 
-    /// The description, the kind of FMU and the design belong together.
-    fn check_guid(&self, design: &[u8]) -> Result<(), Refusal> {
+    /// Which FMU this is: the one whose guid belongs to the design.
+    fn kind(&self, design: &[u8]) -> Result<&'static Kind, Refusal> {
         let text = std::str::from_utf8(self.file(DESCRIPTION)?)
             .map_err(|_| Unreadable(format!("{DESCRIPTION} is not UTF-8: export it again")))?;
         let document = Document::parse(text)
             .map_err(|error| Unreadable(format!("{DESCRIPTION}: {error}: export it again")))?;
         let guid = document.root_element().attribute("guid");
-        let kinds = [model_description::CONTROLLER, model_description::PLANT];
-        match kinds
-            .iter()
-            .any(|kind| guid == Some(&model_description::guid(kind, design)))
-        {
-            true => Ok(()),
-            false => Err(Unproved(format!(
+        let belongs = |kind: &&Kind| guid == Some(&model_description::guid(kind.binary, design));
+        KINDS.iter().find(belongs).ok_or_else(|| {
+            Unproved(format!(
                 "the guid in {DESCRIPTION} does not belong to {DESIGN}: one of them was changed, export it again"
-            ))),
+            ))
+        })
+    }
+
+    /// The description is, byte by byte, the one that belongs to the design.
+    fn check_description(&self, kind: &Kind, design: &Design, bytes: &[u8]) -> Result<(), Refusal> {
+        let expected = kind.describe(design, bytes).map_err(Unproved)?;
+        let found = self.file(DESCRIPTION)?;
+        if found == expected.as_bytes() {
+            return Ok(());
+        }
+        let pairs = found
+            .split(|&b| b == b'\n')
+            .zip(expected.as_bytes().split(|&b| b == b'\n'));
+        let line = pairs
+            .take_while(|(found, expected)| found == expected)
+            .count()
+            + 1;
+        Err(Unproved(format!(
+            "{DESCRIPTION} is not the one of {DESIGN} from line {line} on: it was changed, or another version \
+             of ftc-fmu wrote it; export it again"
+        )))
+    }
+
+    /// There is a binary, and each is one for its platform; returns the platforms.
+    fn check_binaries(&self, identifier: &str) -> Result<Vec<&'static str>, Refusal> {
+        let mut platforms = Vec::new();
+        let files = self.files.iter();
+        for (path, bytes) in
+            files.filter(|(path, _)| path.starts_with("binaries/") && !path.ends_with('/'))
+        {
+            let platform = PLATFORMS
+                .iter()
+                .find(|platform| platform.path(identifier) == *path)
+                .ok_or_else(|| {
+                    Unproved(format!("{path} is no part of this FMU: export it again"))
+                })?;
+            platform
+                .check(bytes)
+                .map_err(|what| Unproved(format!("{path} {what}: export it again")))?;
+            platforms.push(platform.name);
+        }
+        match platforms.is_empty() {
+            true => Err(Unproved(
+                "there is no binary in it for any platform: export it again".into(),
+            )),
+            false => Ok(platforms),
         }
     }
 }
@@ -143,6 +202,8 @@ fn parse<'a, T: serde::Deserialize<'a>>(name: &str, bytes: &'a [u8]) -> Result<T
 struct Certified {
     design: Design,
     certificate: Certificate,
+    /// Platforms for which there is a binary.
+    platforms: Vec<&'static str>,
 }
 
 impl Certified {
@@ -170,6 +231,13 @@ impl Certified {
             "how",
             "every inequality of the shipped doubles, rounding included; nothing was solved".into(),
         );
+        line(
+            "binaries",
+            format!(
+                "{}: of the platform, with the functions of an FMU; their machine code is not proved",
+                self.platforms.join(", ")
+            ),
+        );
         text
     }
 
@@ -190,6 +258,7 @@ impl Certified {
             "state_feedback": of(&claims.state_feedback),
             "gamma": claims.gamma,
             "observer": of(&claims.observer),
+            "platforms": self.platforms,
         }))
     }
 }

@@ -253,6 +253,12 @@ fn the_plant() {
             &["mode 1: A is 2 x 3"],
         ),
         (
+            "A larger than B",
+            "A = [[0.6, 0.45], [-0.2, 0.3]]",
+            "A = [[0.6, 0.45, 0], [-0.2, 0.3, 0], [0, 0, 0.1]]",
+            &["mode 1: B is 2 x 2, but with A of 3 x 3 it has to be 3 x 2"],
+        ),
+        (
             "B of another size",
             "B = [[1.0, 0.0], [0.0, 1.0]]",
             "B = [[1.0], [0.0]]",
@@ -831,6 +837,18 @@ fn the_scenario() {
             "sensor = 1",
             "sensor = 3",
             &["scenario.events[1]: sensor is 3"],
+        ),
+        (
+            "more than the whole gain lost",
+            "kind = \"stuck\", sensor = 1",
+            "kind = \"gain-loss\", loss = 3, sensor = 1",
+            &["scenario.events[1]: loss is 3", "from 0 to 1"],
+        ),
+        (
+            "a sample time of many digits",
+            "sample_time = 1.0",
+            "sample_time = 1e-300",
+            &["sample_time is 1e-300: give a number of at least 1e-15"],
         ),
         (
             "fault that ends before it starts",

@@ -239,6 +239,77 @@ fn a_second_run_replaces_the_first() {
     assert_eq!(bench.files().len(), first.len() + 1);
 }
 
+/// A directory that bears the name of a file to be written is named, and no file is left behind.
+#[test]
+fn all_files_or_none() {
+    let bench = Bench::new(SOUND);
+    fs::create_dir_all(bench.path("out/report.html")).unwrap();
+    fs::write(bench.path("out/metrics.json"), "old").unwrap();
+    let before = bench.files();
+    let run = bench.run(&["simulate", FILE, "--out", "out"]);
+    assert_eq!(run.code(), 2);
+    assert!(
+        run.stderr().contains("report.html is a directory there"),
+        "{}",
+        run.stderr()
+    );
+    assert_eq!(bench.files(), before);
+    assert_eq!(
+        fs::read_to_string(bench.path("out/metrics.json")).unwrap(),
+        "old"
+    );
+
+    let program = installed(
+        &bench,
+        &[
+            "fmu-binaries/linux64/ftc_controller.so",
+            "fmu-binaries/linux64/ftc_plant.so",
+        ],
+    );
+    fs::create_dir_all(bench.path("out/sound_plant.fmu")).unwrap();
+    let before = bench.files();
+    let output = export(&bench, &program, "out");
+    assert_eq!(output.status.code(), Some(2));
+    let message = String::from_utf8(output.stderr).unwrap();
+    assert!(
+        message.contains("sound_plant.fmu is a directory there"),
+        "{message}"
+    );
+    assert_eq!(bench.files(), before);
+}
+
+/// What cannot be printed was asked for in vain; a reader that has read enough is no error.
+#[cfg(target_os = "linux")]
+#[test]
+fn a_full_standard_output_is_an_error_and_a_closed_one_is_not() {
+    use std::process::{Command, Stdio};
+    let bench = Bench::new(SOUND);
+    let design = |stdout: Stdio| {
+        let mut command = Command::new(env!("CARGO_BIN_EXE_ftc-fmu"));
+        command
+            .args(["design", FILE])
+            .current_dir(bench.path("."))
+            .stdout(stdout);
+        command.stderr(Stdio::piped()).output().unwrap()
+    };
+    let full = fs::OpenOptions::new()
+        .write(true)
+        .open("/dev/full")
+        .unwrap();
+    let output = design(full.into());
+    assert_eq!(output.status.code(), Some(2));
+    let message = String::from_utf8(output.stderr).unwrap();
+    assert!(
+        message.contains("standard output cannot be written to"),
+        "{message}"
+    );
+    let (reader, writer) = std::io::pipe().unwrap();
+    drop(reader);
+    let output = design(writer.into());
+    assert_eq!(output.status.code(), Some(0));
+    assert!(output.stderr.is_empty());
+}
+
 #[test]
 fn export_without_binaries_says_what_to_run() {
     let bench = Bench::new(SOUND);

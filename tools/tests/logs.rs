@@ -177,6 +177,11 @@ fn damaged_logs_are_refused_in_one_sentence() {
             &["no column b or y[2]", "use one of"],
         ),
         (
+            "an output less, next to its like",
+            text.replacen(",a,b\n", ",b,other\n", 1),
+            &["no column a or y[1]", "use one of t, other"],
+        ),
+        (
             "misspelt input",
             text.replacen("u[2]", "u2]", 1),
             &["no column u[2]", "did you mean u2]?"],

@@ -8,11 +8,57 @@ use serde_json::Value;
 use std::collections::BTreeMap;
 use std::fs;
 use std::io::{Cursor, Write};
+use std::sync::OnceLock;
 use zip::write::SimpleFileOptions;
 
 const DESIGN: &str = "resources/design.json";
 const CERTIFICATE: &str = "resources/certificate.json";
 const DESCRIPTION: &str = "modelDescription.xml";
+
+/// The platform of this machine, and another.
+const PLATFORMS: [&str; 2] = if cfg!(target_arch = "aarch64") {
+    ["aarch64-linux", "linux64"]
+} else {
+    ["linux64", "aarch64-linux"]
+};
+const HERE: &str = PLATFORMS[0];
+const ELSEWHERE: &str = PLATFORMS[1];
+
+/// A library for this machine that offers what an importer needs, and does nothing.
+fn library() -> &'static [u8] {
+    static LIBRARY: OnceLock<Vec<u8>> = OnceLock::new();
+    LIBRARY.get_or_init(|| compiled(&FUNCTIONS))
+}
+
+const FUNCTIONS: [&str; 10] = [
+    "fmi2GetTypesPlatform",
+    "fmi2GetVersion",
+    "fmi2Instantiate",
+    "fmi2FreeInstance",
+    "fmi2SetupExperiment",
+    "fmi2EnterInitializationMode",
+    "fmi2ExitInitializationMode",
+    "fmi2GetReal",
+    "fmi2SetReal",
+    "fmi2DoStep",
+];
+
+/// A shared library of empty functions, made by the C compiler.
+fn compiled(functions: &[&str]) -> Vec<u8> {
+    let bench = Bench::empty();
+    let source: String = functions
+        .iter()
+        .map(|name| format!("void {name}(void) {{}}\n"))
+        .collect();
+    fs::write(bench.path("x.c"), source).unwrap();
+    let status = std::process::Command::new("cc")
+        .args(["-shared", "-fPIC", "-o"])
+        .args([bench.path("x.so"), bench.path("x.c")])
+        .status()
+        .unwrap();
+    assert!(status.success());
+    fs::read(bench.path("x.so")).unwrap()
+}
 
 /// An exported controller, unpacked.
 struct Exported {
@@ -23,13 +69,12 @@ struct Exported {
 impl Exported {
     fn new(design: &str) -> Self {
         let bench = Bench::new(design);
-        let program = installed(
-            &bench,
-            &[
-                "fmu-binaries/linux64/ftc_controller.so",
-                "fmu-binaries/linux64/ftc_plant.so",
-            ],
-        );
+        let program = installed(&bench, &[]);
+        let folder = bench.path("bin/fmu-binaries").join(HERE);
+        fs::create_dir_all(&folder).unwrap();
+        for kind in ["controller", "plant"] {
+            fs::write(folder.join(format!("ftc_{kind}.so")), library()).unwrap();
+        }
         let output = export(&bench, &program, "out");
         assert!(
             output.status.success(),
@@ -284,6 +329,55 @@ fn a_careful_forger_is_found_out() {
     gamma.refused("gamma lowered", 1, &["attenuation", "could not be proved"]);
 }
 
+#[test]
+fn a_description_that_says_something_else() {
+    let mut renamed = Exported::new(SOUND);
+    let xml = String::from_utf8(renamed.files[DESCRIPTION].clone()).unwrap();
+    assert!(xml.contains("name=\"u[1]\""));
+    let line = xml
+        .lines()
+        .position(|line| line.contains("name=\"u[1]\""))
+        .unwrap()
+        + 1;
+    let changed = xml.replace("name=\"u[1]\"", "name=\"u[7]\"");
+    renamed
+        .files
+        .insert(DESCRIPTION.into(), changed.into_bytes());
+    renamed.refused("a name", 1, &[DESCRIPTION, &format!("line {line} on")]);
+}
+
+#[test]
+fn binaries_that_are_none() {
+    let at = |platform: &str, name: &str| format!("binaries/{platform}/{name}.so");
+    let path = at(HERE, "sound_controller");
+    let path = path.as_str();
+    let with = |name: &str, bytes: Option<&[u8]>| {
+        let mut exported = Exported::new(SOUND);
+        let sound = exported.files.remove(path).unwrap();
+        exported
+            .files
+            .extend(bytes.map(|bytes| (name.to_string(), bytes.to_vec())));
+        exported
+            .files
+            .extend((name != path).then(|| (path.to_string(), sound)));
+        exported
+    };
+    with(path, None).refused("removed", 1, &["no binary"]);
+    with(path, Some(b"hello")).refused("text", 1, &[path, &format!("is no library for {HERE}")]);
+    let cut = &library()[..library().len() / 2];
+    with(path, Some(cut)).refused("cut", 1, &[path]);
+    let (last, most) = FUNCTIONS.split_last().unwrap();
+    with(path, Some(&compiled(most))).refused("a function less", 1, &[path, last]);
+    let other = at(ELSEWHERE, "sound_controller");
+    with(&other, Some(library())).refused(
+        "another machine",
+        1,
+        &[&other, &format!("is no library for {ELSEWHERE}")],
+    );
+    let stranger = at(HERE, "other");
+    with(&stranger, Some(library())).refused("stranger", 1, &[&stranger, "no part of this FMU"]);
+}
+
 fn first_number(value: &mut Value) -> Option<&mut Value> {
     match value {
         Value::Number(_) => Some(value),
@@ -305,10 +399,15 @@ fn what_is_missing_or_no_fmu_of_ours() {
         exported.refused(name, code, &[name]);
     }
     let bench = Bench::new(SOUND);
-    for path in [FILE, ".", "none.fmu"] {
+    for (path, word) in [
+        (FILE, "this is no FMU"),
+        (".", "directory"),
+        ("none.fmu", "opened"),
+    ] {
         let run = bench.run(&["verify", path]);
         assert_eq!(run.code(), 2, "{path}");
         assert!(run.stderr().contains(path), "{}", run.stderr());
+        assert!(run.stderr().contains(word), "{}", run.stderr());
     }
 }
 

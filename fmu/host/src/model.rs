@@ -107,7 +107,9 @@ pub fn native(design: &Design, ticks: usize) -> Vec<(Vec<f64>, Vec<f64>)> {
         };
         controller.tick(&mut state, &sample);
         let row = (seen.y.clone(), state.command.clone());
-        plant.advance(&mut seen, &row.1);
+        plant
+            .advance(&mut seen, &row.1)
+            .expect("the example's plant can be integrated");
         row
     };
     (0..ticks).map(tick).collect()

@@ -7,6 +7,7 @@
 
 use fmu_abi::clock::Event;
 use fmu_abi::{Refusal, Slave, Values, nearest_mode, require_finite, resource, selected_mode};
+use ftc::simulate::integrate::Stalled;
 use ftc::simulate::plant::{Change, External};
 use ftc::simulate::{PlantSimulator, PlantState};
 use model_description::{DESIGN_FILE, Interface, PLANT, Role, Span, VariableTable};
@@ -162,9 +163,12 @@ impl Slave for PlantFmu {
         _k: u64,
     ) -> Result<(), Refusal> {
         self.simulator.observe(state, &self.external(values));
-        self.simulator
-            .advance(state, values.get(self.spans.command));
-        Ok(())
+        let command = values.get(self.spans.command);
+        self.simulator.advance(state, command).map_err(|Stalled| {
+            Refusal::from(
+                "the plant's equations cannot be integrated under this command: give a smaller u",
+            )
+        })
     }
 
     fn end_tick(

@@ -70,9 +70,9 @@ impl PlantSimulator {
                 self.plant.sample_time,
                 &mut trial.next,
             );
-            self.advance(trial, u);
+            let _ = self.advance(trial, u);
         } else {
-            self.advance(trial, u);
+            let _ = self.advance(trial, u);
             trial.next.fill(0.0);
             let Some((mode, _)) = self.described(trial.mode) else {
                 return;

@@ -5,6 +5,9 @@
 /// No physical quantity in reasonable units is larger; beyond it products overflow.
 const LARGEST: f64 = 1e15;
 
+/// No positive one is smaller; beyond it quotients overflow.
+const SMALLEST: f64 = 1.0 / LARGEST;
+
 /// A finite number of bearable size.
 pub fn number(value: f64) -> Result<(), String> {
     if value.is_finite() && value.abs() <= LARGEST {
@@ -19,8 +22,12 @@ pub fn number(value: f64) -> Result<(), String> {
 /// A number above zero.
 pub fn positive(value: f64) -> Result<(), String> {
     number(value)?;
-    if value >= 1.0 / LARGEST {
+    if value >= SMALLEST {
         Ok(())
+    } else if value > 0.0 {
+        Err(format!(
+            "is {value:e}: give a number of at least {SMALLEST:e}"
+        ))
     } else {
         Err(format!("is {value}: give a positive number"))
     }
@@ -33,6 +40,15 @@ pub fn not_negative(value: f64) -> Result<(), String> {
         Ok(())
     } else {
         Err(format!("is {value}: give 0 or a positive number"))
+    }
+}
+
+/// A share of a whole.
+pub fn fraction(value: f64) -> Result<(), String> {
+    if (0.0..=1.0).contains(&value) {
+        Ok(())
+    } else {
+        Err(format!("is {value}: give a fraction from 0 to 1"))
     }
 }
 

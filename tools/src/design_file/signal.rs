@@ -215,7 +215,7 @@ impl Event {
                 until,
                 loss,
             } => {
-                let loss = finite("loss", loss)?;
+                super::check::fraction(loss).map_err(|what| format!("loss {what}"))?;
                 (sensor, from, until, FaultKind::GainLoss { loss })
             }
             Self::Stuck {

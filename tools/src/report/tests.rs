@@ -244,8 +244,8 @@ fn keep(name: &str, design: &Design, trajectories: &[Trajectory]) {
     let folder = PathBuf::from(env!("CARGO_MANIFEST_DIR"))
         .join("../target/pages")
         .join(name);
-    super::write(design, trajectories, &folder.join("report.html")).expect("a page");
-    for figure in demo::page(design, trajectories).figures() {
+    super::write(design, trajectories, &[], &folder.join("report.html")).expect("a page");
+    for figure in demo::page(design, trajectories, &[]).figures() {
         let file = folder.join(format!("{}.svg", figure.key));
         check_svg(&std::fs::read_to_string(file).expect("a figure beside the page"));
     }
@@ -256,7 +256,7 @@ fn the_papers_example_makes_a_whole_page() {
     for (name, noise) in [("paper", 0.0), ("noisy", 0.005)] {
         let design = paper(noise);
         let trajectories = simulate(&design);
-        let page = demo::page(&design, &trajectories);
+        let page = demo::page(&design, &trajectories, &[]);
         assert_eq!(page.figures().count(), 2 + 2 + 2 + 2 + 1);
         let html = check_page(&page);
         assert!(
@@ -274,7 +274,7 @@ fn any_size_makes_a_page_below_a_megabyte() {
     for (outputs, disturbances, steps) in [(1, 0, 1), (1, 0, 300), (12, 3, 20_000)] {
         let design = lags(outputs, disturbances, steps);
         let trajectories = simulate(&design);
-        let html = check_page(&demo::page(&design, &trajectories));
+        let html = check_page(&demo::page(&design, &trajectories, &[]));
         assert!(html.len() < 1_000_000, "{} bytes", html.len());
         keep(&format!("lags-{outputs}-{steps}"), &design, &trajectories);
     }
@@ -284,14 +284,14 @@ fn any_size_makes_a_page_below_a_megabyte() {
 fn user_strings_cannot_break_out() {
     let design = hostile(paper(0.005));
     let trajectories = simulate(&design);
-    let html = check_page(&demo::page(&design, &trajectories));
+    let html = check_page(&demo::page(&design, &trajectories, &[]));
     assert!(html.contains("&lt;script&gt;"));
     keep("hostile", &design, &trajectories);
 }
 
 #[test]
 fn nothing_simulated_is_said_so() {
-    let html = check_page(&demo::page(&paper(0.0), &[]));
+    let html = check_page(&demo::page(&paper(0.0), &[], &[]));
     assert!(html.contains("Nothing was simulated."));
 }
 
@@ -299,7 +299,7 @@ fn nothing_simulated_is_said_so() {
 fn a_lost_sensor_leaves_a_gap_in_its_curve() {
     let design = lags(1, 0, 300);
     let trajectories = simulate(&design);
-    let page = demo::page(&design, &trajectories);
+    let page = demo::page(&design, &trajectories, &[]);
     let document = svg::document(page.figures().next().expect("an output"));
     let tree = roxmltree::Document::parse(&document).expect("well-formed");
     let measured = tree

@@ -81,7 +81,9 @@ impl Contender {
                 "gains of the sound Theorem 2 (attenuation), fault estimated with the reference window, \
                  virtual sensor"
             }
-            Self::ToldTheFault => "the same gains, told the true fault: the bound of any estimator",
+            Self::ToldTheFault => {
+                "the same gains, told the true fault; an estimate that also takes up disturbance or noise may do better"
+            }
             Self::PrintedCompensation => {
                 "the same gains and estimates, compensated by the additive control (37)-(40)"
             }

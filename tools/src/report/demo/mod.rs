@@ -19,12 +19,17 @@ use std::path::Path;
 /// Writes the page of a simulated design to `path` and each of its figures as `KEY.svg` beside it.
 ///
 /// Every file appears complete or not at all. The trajectories may be any of the variants, in any
-/// order; what is missing is left out.
+/// order; what is missing is left out. `warnings` are sentences that stand first.
 ///
 /// # Errors
 /// Names the file that could not be written.
-pub fn write(design: &Design, trajectories: &[Trajectory], path: &Path) -> Result<()> {
-    let page = page(design, trajectories);
+pub fn write(
+    design: &Design,
+    trajectories: &[Trajectory],
+    warnings: &[String],
+    path: &Path,
+) -> Result<()> {
+    let page = page(design, trajectories, warnings);
     let folder = match path.parent() {
         Some(parent) if parent != Path::new("") => parent,
         _ => Path::new("."),
@@ -92,20 +97,24 @@ fn unit_of(signals: &[Signal], index: usize) -> Option<&str> {
 }
 
 /// The whole page.
-pub(super) fn page(design: &Design, trajectories: &[Trajectory]) -> Page {
+pub(super) fn page(design: &Design, trajectories: &[Trajectory], warnings: &[String]) -> Page {
     let scene = Scene::new(design, trajectories);
-    let mut sections = vec![
+    let mut sections = Vec::new();
+    if !warnings.is_empty() {
+        let section = Section::new("Warnings");
+        sections.push(warnings.iter().fold(section, Section::paragraph));
+    }
+    sections.extend([
         Section::new("Outputs")
             .paragraph(
                 "What the plant really does (the true output, which no sensor of the faulty loop shows) with and \
-                 without fault-tolerant control (FTC), beside a controller that is told the true fault: no estimator \
-                 can do better. Thin grey is what the sensor says in the loop with FTC. Shaded: the fault of this sensor is present.",
+                 without fault-tolerant control (FTC), beside the same controller told the true fault. Thin grey is what the sensor says in the loop with FTC. Shaded: the fault of this sensor is present.",
             )
             .figures(scene.outputs()),
         Section::new("Figures of merit")
             .with(Block::Table(tables::merits(design, trajectories)))
             .with(Block::Table(tables::variants(trajectories))),
-    ];
+    ]);
     let faults = scene.faults();
     if !faults.is_empty() {
         sections.push(

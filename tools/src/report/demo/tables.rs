@@ -80,7 +80,9 @@ pub fn variants(trajectories: &[Trajectory]) -> Table {
 fn explanation(variant: Variant) -> &'static str {
     match variant {
         Variant::Ftc => "the design: faults are estimated and taken out of the measurement",
-        Variant::ToldTheFault => "the same gains, told the true fault: the bound of any estimator",
+        Variant::ToldTheFault => {
+            "the same gains, told the true fault; an estimate that also takes up disturbance or noise may do better"
+        }
         Variant::Predictive => "model predictive control without fault estimation",
         Variant::Additive => {
             "the additive FTC of the paper’s section III: no attenuation of the disturbance"

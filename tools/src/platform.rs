@@ -1,0 +1,79 @@
+//! The platforms an FMU may run on, and what their binaries must be.
+
+use object::{Architecture, BinaryFormat, Object};
+
+/// A platform for which binaries may have been built.
+pub struct Platform {
+    /// Directory inside the FMU and beside this program.
+    pub name: &'static str,
+    /// Extension of its shared libraries.
+    pub extension: &'static str,
+    format: BinaryFormat,
+    architecture: Architecture,
+}
+
+/// All of them.
+pub const PLATFORMS: [Platform; 3] = [
+    Platform {
+        name: "linux64",
+        extension: "so",
+        format: BinaryFormat::Elf,
+        architecture: Architecture::X86_64,
+    },
+    Platform {
+        name: "win64",
+        extension: "dll",
+        format: BinaryFormat::Pe,
+        architecture: Architecture::X86_64,
+    },
+    Platform {
+        name: "aarch64-linux",
+        extension: "so",
+        format: BinaryFormat::Elf,
+        architecture: Architecture::Aarch64,
+    },
+];
+
+/// Functions without which no importer closes a loop.
+const NEEDED: [&str; 10] = [
+    "fmi2GetTypesPlatform",
+    "fmi2GetVersion",
+    "fmi2Instantiate",
+    "fmi2FreeInstance",
+    "fmi2SetupExperiment",
+    "fmi2EnterInitializationMode",
+    "fmi2ExitInitializationMode",
+    "fmi2GetReal",
+    "fmi2SetReal",
+    "fmi2DoStep",
+];
+
+impl Platform {
+    /// Where the binary of an FMU lies in its archive.
+    pub fn path(&self, identifier: &str) -> String {
+        let Self {
+            name, extension, ..
+        } = self;
+        format!("binaries/{name}/{identifier}.{extension}")
+    }
+
+    /// Whether these bytes are a library for this platform that offers the functions of an FMU.
+    /// What its machine code does is not looked at.
+    ///
+    /// # Errors
+    /// The end of a sentence that begins with the library's path.
+    pub fn check(&self, bytes: &[u8]) -> Result<(), String> {
+        let file = object::File::parse(bytes)
+            .ok()
+            .filter(|file| file.format() == self.format && file.architecture() == self.architecture)
+            .ok_or_else(|| format!("is no library for {}", self.name))?;
+        let exports = file
+            .exports()
+            .map_err(|error| format!("cannot be read ({error})"))?;
+        let offers = |name: &&str| exports.iter().any(|found| found.name() == name.as_bytes());
+        match NEEDED.iter().find(|name| !offers(name)) {
+            Some(name) => Err(format!("offers no function {name}")),
+            None => Ok(()),
+        }
+    }
+}
