@@ -203,7 +203,7 @@ impl Controller {
         sample: &Sample<'_>,
     ) {
         let settings = &self.parameters.estimator;
-        state.observer.expected_output(model, &mut state.substitute);
+        state.open_loop.output(model, &mut state.substitute);
         state
             .estimator
             .predict_into(settings, &mut state.substitute);
@@ -223,7 +223,10 @@ impl Controller {
         if estimated {
             let held = state.estimator.held(settings);
             let (thresholds, corrected) = (sample.thresholds, &mut state.corrected);
-            state.open_loop.overrule(model, held, thresholds, corrected);
+            let expected = &state.substitute;
+            state
+                .open_loop
+                .overrule(expected, held, thresholds, corrected);
         }
         kernel::bound(&mut state.corrected);
     }
@@ -327,8 +330,7 @@ impl Controller {
                 .predict(&gain.0, model, &state.acting, &state.corrected);
         }
         let settings = &self.parameters.estimator;
-        let holding = state.estimator.held(settings).any(|held| held);
-        if holding {
+        if state.estimator.leans_on_the_model(settings) {
             state.open_loop.advance(model, &state.acting);
         } else {
             state.open_loop.restart(state.observer.predicted());

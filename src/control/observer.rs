@@ -66,11 +66,6 @@ impl ObserverState {
         &self.prior
     }
 
-    /// The output this observer expects now (p), before any measurement.
-    pub fn expected_output(&self, mode: &ObservedMode, out: &mut [f64]) {
-        kernel::affine(out, &mode.output_offset, &mode.c, &self.prior);
-    }
-
     /// Corrects the prior with measurement `y`, having come from mode `from` into mode `to`.
     pub fn correct(
         &mut self,

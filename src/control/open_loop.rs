@@ -21,14 +21,12 @@ pub struct OpenLoop {
     state: Vec<f64>,
     /// The next state, while it is computed (n).
     next: Vec<f64>,
-    /// Its output (p).
-    output: Vec<f64>,
     /// Which sensors are contradicted now (p).
     contradicted: Vec<bool>,
 }
 
 crate::state::state!(OpenLoop {
-    parts: [state, next, output, contradicted],
+    parts: [state, next, contradicted],
     constants: [],
     counters: []
 });
@@ -39,12 +37,11 @@ impl OpenLoop {
         Self {
             state: x0.to_vec(),
             next: x0.to_vec(),
-            output: vec![0.0; outputs],
             contradicted: vec![false; outputs],
         }
     }
 
-    /// While readings can be judged: starts anew from the observer's prediction of the next state (n).
+    /// While nobody leans on it: starts anew from the observer's prediction of the next state (n).
     pub fn restart(&mut self, predicted: &[f64]) {
         kernel::copy(&mut self.state, predicted);
         self.contradicted.fill(false);
@@ -58,22 +55,29 @@ impl OpenLoop {
         kernel::copy(&mut self.state, &self.next);
     }
 
+    /// What the model says the outputs are now (p).
+    ///
+    /// It feeds on no estimate, so it can stand in for a silent sensor: the observer's own prediction
+    /// in that place would make another observer, of which nothing was proved.
+    pub fn output(&self, mode: &ObservedMode, out: &mut [f64]) {
+        kernel::affine(out, &mode.output_offset, &mode.c, &self.state);
+    }
+
     /// Replaces the `corrected` readings (p) of sensors whose estimate is `held` (p) and that differ
-    /// from the model's by more than their `thresholds` (p) allow.
+    /// from what is `expected` of them (p) by more than their `thresholds` (p) allow.
     pub fn overrule(
         &mut self,
-        mode: &ObservedMode,
+        expected: &[f64],
         held: impl Iterator<Item = bool>,
         thresholds: &[f64],
         corrected: &mut [f64],
     ) {
-        kernel::affine(&mut self.output, &mode.output_offset, &mode.c, &self.state);
-        let sensors = held.zip(thresholds).zip(&self.output);
+        let sensors = held.zip(thresholds).zip(expected);
         let readings = corrected.iter_mut().zip(&mut self.contradicted);
-        for ((reading, contradicted), ((held, &threshold), &expected)) in readings.zip(sensors) {
-            *contradicted = held && (*reading - expected).abs() > TOLERANCE * threshold;
+        for ((reading, contradicted), ((held, &threshold), &modelled)) in readings.zip(sensors) {
+            *contradicted = held && (*reading - modelled).abs() > TOLERANCE * threshold;
             if *contradicted {
-                *reading = expected;
+                *reading = modelled;
             }
         }
     }

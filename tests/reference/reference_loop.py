@@ -256,10 +256,6 @@ class Observer:
         self.prior = np.zeros(0)
         self.pending: tuple | None = None
 
-    def predict(self, mode: int) -> np.ndarray:
-        """Returns the output expected in `mode` before it is measured."""
-        return self.modes[mode].C @ self.prior + self.modes[mode].c
-
     def start(self, mode: int) -> None:
         """Rests at the mode's operating point."""
         self.prior = self.modes[mode].x0
@@ -381,15 +377,15 @@ class Loop:
                 estimator.enter(left, mode)
             heard = repetition.screen(y)
             estimator.judge(tick, mode, heard)
-            substitute = np.where(estimator.judged, estimator.y_hat, observer.predict(mode))
+            modelled = self.modes[mode].C @ model_run + self.modes[mode].c
+            substitute = np.where(estimator.judged, estimator.y_hat, modelled)
             fault = self.trusted_fault(variant, estimator.f_hat, sensors.fault)
             believed = heard if variant == "ftc" else y
             y_c = np.where(np.isfinite(believed), believed - fault, substitute)
-            held = estimator.enabled & np.array([flag.up for flag in estimator.flags]) & ~estimator.judged
+            held = np.array([flag.up for flag in estimator.flags]) & ~estimator.judged
             if variant == "ftc" and self.design["controller"]["compensation"] == "virtual-sensor":
-                modelled = self.modes[mode].C @ model_run + self.modes[mode].c
                 far = np.abs(y_c - modelled) > 4.0 * np.array(estimator.settings["thresholds"])
-                y_c = np.where(held & far, modelled, y_c)
+                y_c = np.where(estimator.enabled & held & far, modelled, y_c)
             observer.correct(mode, y_c)
             if mode != left and feedback["bumpless"]:
                 G = np.array(feedback["modes"][mode]["integral"])

@@ -221,6 +221,13 @@ impl EstimatorState {
         sensors.map(move |(&flagged, &judged)| reference && flagged && !judged)
     }
 
+    /// Whether an accused sensor has no trusted prediction to stand in for it.
+    pub fn leans_on_the_model(&self, estimator: &Estimator) -> bool {
+        let predicts = estimator.method == EstimatorMethod::Reference;
+        let mut sensors = self.flagged.iter().zip(&self.judged);
+        sensors.any(|(&flagged, &judged)| flagged && !(predicts && judged))
+    }
+
     /// Judges one sample, sensor by sensor.
     pub fn observe(&mut self, estimator: &Estimator, seen: &Observation<'_>) {
         self.history.regress(seen.u0);
