@@ -111,11 +111,10 @@ proptest! {
         direction in prop::array::uniform2(-1.0..1.0f64),
         steering in prop::array::uniform2(-1.0..1.0f64),
         reference in prop::array::uniform2(-1.0..1.0f64),
-        believe in any::<bool>(),
+        believe in prop::array::uniform2(any::<bool>()),
     ) {
         let controller = Controller::new(parameters(design));
         let thresholds = controller.parameters().estimator.thresholds.clone();
-        let compensate = if believe { Compensate::Nothing } else { Compensate::Estimate };
         let mut state = controller.initial_state(0);
         let mut x = [0.0; 2];
         let mut last = None;
@@ -129,6 +128,9 @@ proptest! {
             let fault = if tick + 20 > ticks { fault } else { 0.0 };
             let y = [x[0] + fault, x[1] + 0.01 * (tick as f64).sin()];
             let mode = usize::from(tick >= switch);
+            // Compensation may be switched off or on just before the last tick.
+            let believes = believe[usize::from(tick == ticks)];
+            let compensate = if believes { Compensate::Nothing } else { Compensate::Estimate };
             let sample = |y: &[f64; 2], reference: &[f64; 2], state: &mut ControllerState, derive: Option<ftc::control::Change<'_>>| {
                 let sample = Sample {
                     tick, mode, measurement: y, reference, thresholds: &thresholds, compensate,

@@ -195,6 +195,12 @@ impl Controller {
         left
     }
 
+    /// Whether the estimate is what is subtracted from the measurement.
+    fn takes_out_the_estimate(&self, sample: &Sample<'_>) -> bool {
+        sample.compensate == Compensate::Estimate
+            && self.parameters.compensation == Compensation::VirtualSensor
+    }
+
     /// `y_c`: the measurement without the fault; a lost sensor is replaced by what is expected of it.
     fn correct_measurement(
         &self,
@@ -207,8 +213,7 @@ impl Controller {
         state
             .estimator
             .predict_into(settings, &mut state.substitute);
-        let estimated = sample.compensate == Compensate::Estimate
-            && self.parameters.compensation == Compensation::VirtualSensor;
+        let estimated = self.takes_out_the_estimate(sample);
         let fault = match sample.compensate {
             Compensate::Known(fault) => fault,
             Compensate::Estimate if estimated => &state.estimator.fault,

@@ -50,6 +50,20 @@ pub struct ObservedMode {
     pub output_offset: Vec<f64>,
 }
 
+impl ObservedMode {
+    /// The state one sample on (n), from `state` (n) under the acting input `u` (m), bounded.
+    pub fn step(&self, next: &mut [f64], state: &[f64], u: &[f64]) {
+        kernel::affine(next, &self.state_offset, &self.a, state);
+        kernel::add_product(next, &self.b, u);
+        kernel::bound(next);
+    }
+
+    /// The output (p) at `state` (n).
+    pub fn output(&self, out: &mut [f64], state: &[f64]) {
+        kernel::affine(out, &self.output_offset, &self.c, state);
+    }
+}
+
 impl ObserverState {
     /// Starts at state `x0` (n) with `outputs` sensors.
     pub fn new(x0: &[f64], outputs: usize) -> Self {
@@ -75,12 +89,7 @@ impl ObserverState {
         to: usize,
         y: &[f64],
     ) {
-        kernel::affine(
-            &mut self.innovation,
-            &mode.output_offset,
-            &mode.c,
-            &self.prior,
-        );
+        mode.output(&mut self.innovation, &self.prior);
         subtract_from(&mut self.innovation, y);
         kernel::copy(&mut self.estimate, &self.prior);
         kernel::add_scaled(&mut self.estimate, 1.0, &self.injection);
@@ -104,19 +113,12 @@ impl ObserverState {
 
     /// Predicts the next state under the acting input `u`, and keeps the injection of measurement `y`.
     pub fn predict(&mut self, gain: &DMatrix<f64>, mode: &ObservedMode, u: &[f64], y: &[f64]) {
-        kernel::affine(
-            &mut self.innovation,
-            &mode.output_offset,
-            &mode.c,
-            &self.estimate,
-        );
+        mode.output(&mut self.innovation, &self.estimate);
         subtract_from(&mut self.innovation, y);
         self.injection.fill(0.0);
         kernel::add_product(&mut self.injection, gain, &self.innovation);
-        kernel::affine(&mut self.prior, &mode.state_offset, &mode.a, &self.estimate);
-        kernel::add_product(&mut self.prior, &mode.b, u);
         kernel::bound(&mut self.injection);
-        kernel::bound(&mut self.prior);
+        mode.step(&mut self.prior, &self.estimate, u);
     }
 }
 

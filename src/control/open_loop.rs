@@ -49,9 +49,7 @@ impl OpenLoop {
 
     /// Predicts one sample on under the acting input `u` (m).
     pub fn advance(&mut self, mode: &ObservedMode, u: &[f64]) {
-        kernel::affine(&mut self.next, &mode.state_offset, &mode.a, &self.state);
-        kernel::add_product(&mut self.next, &mode.b, u);
-        kernel::bound(&mut self.next);
+        mode.step(&mut self.next, &self.state, u);
         kernel::copy(&mut self.state, &self.next);
     }
 
@@ -60,7 +58,7 @@ impl OpenLoop {
     /// It feeds on no estimate, so it can stand in for a silent sensor: the observer's own prediction
     /// in that place would make another observer, of which nothing was proved.
     pub fn output(&self, mode: &ObservedMode, out: &mut [f64]) {
-        kernel::affine(out, &mode.output_offset, &mode.c, &self.state);
+        mode.output(out, &self.state);
     }
 
     /// Replaces the `corrected` readings (p) of sensors whose estimate is `held` (p) and that differ

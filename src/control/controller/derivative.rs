@@ -13,7 +13,6 @@
 use super::{Compensate, Controller, ControllerState, Sample, readings};
 use crate::control::compensation::is_measurement;
 use crate::control::kernel;
-use crate::control::parameters::Compensation;
 
 /// A small change of what a tick is told.
 #[derive(Clone, Copy, Debug)]
@@ -57,8 +56,7 @@ impl Controller {
         sample: &Sample<'_>,
         dy: &[f64],
     ) {
-        let subtracted = sample.compensate == Compensate::Estimate
-            && self.parameters.compensation == Compensation::VirtualSensor;
+        let subtracted = self.takes_out_the_estimate(sample);
         let believed = readings(&trial.repetition, sample);
         let changes = trial.estimator.fault.iter().zip(believed).zip(dy);
         let readings = trial
@@ -67,7 +65,7 @@ impl Controller {
             .zip(trial.open_loop.contradicted());
         for ((corrected, &overruled), ((&fault, &y), &dy)) in readings.zip(changes) {
             let change = if subtracted { dy - fault } else { dy };
-            let seen = if is_measurement(y) && !overruled {
+            let seen = if is_measurement(y) && !(subtracted && overruled) {
                 change
             } else {
                 0.0
