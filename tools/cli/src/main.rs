@@ -1,7 +1,7 @@
 //! `ftc-fmu`: from a design file to a certified controller, its FMUs and its simulation.
 //!
 //! ```text
-//! DESIGN.toml ── design-file ──> ftc::design ──┬─> report    (design, simulate)
+//! DESIGN.toml ── design-file ──> ftc_design ──┬─> report    (design, simulate)
 //!                                              └─> package   (export: two FMUs)
 //!                         FMU ────────────────────> package  (verify: the proof, once more)
 //!
@@ -18,8 +18,8 @@ mod progress;
 use clap::{Parser, Subcommand, ValueEnum};
 use design_file::schema::DesignFile;
 use failure::Failure;
-use ftc::design::Design;
-use ftc::design::assembly::Request;
+use ftc_design::Design;
+use ftc_design::assembly::Request;
 use package::output::Staging;
 use progress::Progress;
 use report::{summary, warnings};
@@ -323,7 +323,7 @@ fn solve(path: &Path, progress: &Progress) -> Result<Made, Failure> {
     let asked = request.control.clone();
     let logged = warnings::Logged::of(&request.estimator.database);
     progress.tell("solving for gains and certifying them");
-    let design = ftc::design::assembly::assemble(request)
+    let design = ftc_design::assembly::assemble(request)
         .map_err(|error| Failure::new(path, asked, error))?;
     let warnings = warnings::of_design(&file, logged.as_ref(), &design);
     Ok(Made { design, warnings })
