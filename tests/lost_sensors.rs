@@ -2,10 +2,10 @@
 
 mod plants;
 
-use ftc::design::observer::sets;
-use ftc::design::{ControlSpec, Lyapunov, Objective, ObserverChoice, ObserverSpec, Synthesis};
-use ftc::plant::scaling::Scaling;
-use ftc::plant::{SwitchedPlant, spectral_radius};
+use ftc_design::observer::sets;
+use ftc_design::{ControlSpec, Lyapunov, Objective, ObserverChoice, ObserverSpec, Synthesis};
+use ftc_plant::scaling::Scaling;
+use ftc_plant::{SwitchedPlant, spectral_radius};
 use plants::{Channel, paper, random_plant};
 
 fn synthesise(
@@ -32,7 +32,7 @@ fn synthesise(
         lyapunov,
         noise: Vec::new(),
     };
-    ftc::design::synthesise(plant, &control, &observer, &Scaling::automatic(plant)).ok()
+    ftc_design::synthesise(plant, &control, &observer, &Scaling::automatic(plant)).ok()
 }
 
 #[test]
