@@ -71,7 +71,6 @@ fn lags(outputs: usize, disturbances: usize, steps: u64) -> Design {
         feedforward: DMatrix::zeros(outputs, 0),
         previous_input: DMatrix::zeros(outputs, 0),
         anti_windup: DMatrix::zeros(outputs, outputs),
-        integral_inverse: &square * 5.0,
         output_feedback: &square * -0.1,
     };
     let nothing = Gain(DMatrix::zeros(outputs, outputs));
@@ -93,7 +92,7 @@ fn lags(outputs: usize, disturbances: usize, steps: u64) -> Design {
                 tracked: (0..outputs).collect(),
                 latency: 0,
                 resonators: vec![],
-                bumpless: false,
+                transfer: None,
                 modes: vec![gains; 2],
             },
             observer: Observer {

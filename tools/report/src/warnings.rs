@@ -9,9 +9,10 @@ use design_file::sentence::shorten;
 use design_file::values::NameOrList;
 use ftc_control::estimator::{InputHistory, leverage};
 use ftc_control::parameters::{Estimator, EstimatorMethod, Predictor};
-use ftc_design::Design;
 use ftc_design::assembly::DatabaseSource;
 use ftc_design::commissioning::{Database, model_predictor};
+use ftc_design::state_feedback::REJECTION;
+use ftc_design::{Design, Objective, Signal};
 use ftc_plant::Mode;
 use ftc_plant::Truth;
 use ftc_plant::scenario::first_tick;
@@ -26,6 +27,8 @@ const FAR: f64 = 0.5;
 const UNEXPLAINED: f64 = 0.3;
 /// Share of the samples of a run that may lie outside the database before it is worth a word.
 const FEW: f64 = 0.05;
+/// Share of an input's range that the noise on a command may reach before it is worth a word.
+const LOUD: f64 = 0.1;
 /// Share of the samples of a run that mode switches may take before it is worth a word.
 const MANY: f64 = 0.25;
 
@@ -60,6 +63,7 @@ pub fn of_design(file: &DesignFile, logged: Option<&Logged>, design: &Design) ->
     let lasting = Lasting::of(design);
     let mut warnings = Vec::new();
     warnings.extend(unknown_noise(file));
+    warnings.extend(idle_weights(file, design));
     warnings.extend(lasting.too_short_to_judge(&design.controller.estimator));
     warnings.extend(lasting.too_short_to_be_proved(design));
     warnings.extend(outside_the_database(design));
@@ -75,7 +79,14 @@ pub fn of_runs(design: &Design, runs: &[Trajectory]) -> Vec<String> {
     let unjudged = ftc.into_iter().flat_map(|run| unjudged(design, run));
     let stalled = runs.iter().filter_map(|run| stalled(design, run));
     let held_up = runs.iter().filter_map(|run| held_up(design, run));
-    unjudged.chain(stalled).chain(held_up).collect()
+    let saturated = ftc.into_iter().flat_map(|run| saturated(design, run));
+    let noisy = noisy_commands(design);
+    unjudged
+        .chain(saturated)
+        .chain(noisy)
+        .chain(stalled)
+        .chain(held_up)
+        .collect()
 }
 
 /// The warnings as a person reads them below a report.
@@ -84,6 +95,89 @@ pub fn text(warnings: &[String]) -> String {
         let _ = writeln!(text, "warning: {warning}");
         text
     })
+}
+
+/// Weights that were given and shape nothing.
+fn idle_weights(file: &DesignFile, design: &Design) -> Option<String> {
+    let asked = &file.controller;
+    let given = [
+        ("output_weight", asked.output_weight.is_some()),
+        ("integral_weight", asked.integral_weight.is_some()),
+        ("input_weight", asked.input_weight.is_some()),
+    ];
+    let names: Vec<String> = given
+        .iter()
+        .filter(|(_, given)| *given)
+        .map(|(name, _)| format!("controller.{name}"))
+        .collect();
+    let control = &design.synthesis.as_ref()?.state_feedback;
+    let reason = match (&control.gamma, control.spec.objective) {
+        (_, Objective::Decay) => {
+            "objective = \"decay\" looks at nothing but the decay: ask for \"attenuation\""
+        }
+        (None, Objective::Attenuation) => {
+            "no disturbance reaches the state: give E, F or a B that is not zero"
+        }
+        (Some(gamma), Objective::Attenuation) => {
+            let units = &control.certificate.units;
+            let rejection = REJECTION * units.performance / units.disturbance;
+            let rejected = gamma.iter().all(|&gamma| gamma <= rejection);
+            rejected.then_some("the disturbance can be rejected completely, whatever they are")?
+        }
+    };
+    (!names.is_empty()).then(|| format!("{} have no effect: {reason}", names.join(", ")))
+}
+
+/// Inputs that spend many samples of a run at a limit.
+fn saturated(design: &Design, run: &Trajectory) -> Vec<String> {
+    let samples = run.records.len().max(1);
+    let at_limit = |input: usize| {
+        let limit = &design.controller.input_limits[input];
+        let held = |record: &&Record| {
+            let u = Some(record.u[input]);
+            u == limit.min || u == limit.max
+        };
+        run.records.iter().filter(held).count() as f64 / samples as f64
+    };
+    let inputs = design.signals.inputs.iter().enumerate();
+    let shares = inputs.map(|(index, input)| (input, at_limit(index)));
+    let many = shares.filter(|(_, share)| *share > FEW);
+    many.map(|(input, share)| {
+        format!(
+            "ftc: {} is at a limit in {:.1} % of the samples, and what is proved holds only while no input is: raise \
+             controller.input_weight, ask for a slower decay, or widen its min and max",
+            input.name,
+            100.0 * share
+        )
+    })
+    .collect()
+}
+
+/// Commands that the sensors' noise alone moves by much.
+fn noisy_commands(design: &Design) -> Vec<String> {
+    let Some(synthesis) = &design.synthesis else {
+        return Vec::new();
+    };
+    let noise = &synthesis.running_loop.command_noise;
+    let inputs = design.signals.inputs.iter().enumerate();
+    let largest = inputs.map(|(index, input)| {
+        let modes = noise.iter().map(|mode| mode[index]);
+        (input, modes.fold(0.0, f64::max))
+    });
+    let range = |input: &Signal| {
+        let range = input.min.zip(input.max).map(|(min, max)| (max - min) / 2.0);
+        range.unwrap_or(input.nominal)
+    };
+    let loud = largest.filter(|(input, deviation)| *deviation > LOUD * range(input));
+    loud.map(|(input, deviation)| {
+        format!(
+            "ftc: the noise of the sensors moves {} by {} (standard deviation), more than a tenth of its range: raise \
+             controller.input_weight, or ask for slower decays",
+            input.name,
+            number(deviation)
+        )
+    })
+    .collect()
 }
 
 /// Thresholds that nothing was known for.
