@@ -1,11 +1,11 @@
 """Sensor-fault-tolerant control of switched plants: design, proof, FMUs, simulation.
 
-    import ftc_fmu as ftc
+import ftc_fmu as ftc
 
-    plant = ftc.Plant([sys1, sys2], sample_time=5.0, disturbance_inputs=[2])
-    design = ftc.design(plant, name="tank", tracked=["level 1", "level 2"], decay=0.97)
-    run = design.simulate()
-    design.export("out")
+plant = ftc.Plant([sys1, sys2], sample_time=5.0, disturbance_inputs=[2])
+design = ftc.design(plant, name="tank", tracked=["level 1", "level 2"], decay=0.97)
+run = design.simulate()
+design.export("out")
 """
 
 from __future__ import annotations

@@ -1,5 +1,3 @@
-"""The compiled half of the package; use the modules that wrap it."""
-
 from collections.abc import Callable
 
 class Design:
@@ -53,9 +51,7 @@ def identify(
 ) -> tuple[
     int,
     list[tuple[int, float]],
-    list[
-        tuple[list[list[float]], list[list[float]], list[list[float]], list[list[float]], list[float], int, int]
-    ],
+    list[tuple[list[list[float]], list[list[float]], list[list[float]], list[list[float]], list[float], int, int]],
     str,
     float | None,
 ]: ...

@@ -81,7 +81,9 @@ def _labels(system: Any, kind: str) -> list[str] | None:  # noqa: ANN401
 
 def _from_arrays(system: tuple | list, where: str, *, continuous: bool) -> Matrices:
     if len(system) not in (3, 4, 5):
-        raise DesignFileError(f"{where} has {len(system)} parts: give (A, B, C), (A, B, C, D) or (A, B, C, D, dt)", where)
+        raise DesignFileError(
+            f"{where} has {len(system)} parts: give (A, B, C), (A, B, C, D) or (A, B, C, D, dt)", where
+        )
     A, B, C = (np.atleast_2d(np.array(part, dtype=float)) for part in system[:3])
     n = len(A)
     if B.shape[0] != n and B.size == n:

@@ -56,6 +56,10 @@ class Design:
         """Seconds between two samples."""
         return float(self.document["sample_time"])
 
+    def record(self) -> dict[str, Any]:
+        """Returns the design as it ships in an FMU, `resources/design.json`: every gain and matrix."""
+        return json.loads(self._core.record())[0]
+
     def to_toml(self) -> str:
         """Returns the design file; `ftc_fmu.load` of it makes the same design."""
         return to_toml(self.document)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -73,7 +73,6 @@ class Mode:
         return table
 
 
-@dataclass
 class Plant:
     """A plant that switches between known linear modes.
 
@@ -102,31 +101,43 @@ class Plant:
         DesignFileError: One sentence about what does not fit.
     """
 
-    systems: Any
-    sample_time: float
-    disturbance_inputs: Sequence[int | str] = ()
-    continuous: bool = False
-    inputs: Sequence[str | Mapping[str, Any]] | None = None
-    outputs: Sequence[str | Mapping[str, Any]] | None = None
-    states: Sequence[str | Mapping[str, Any]] | None = None
-    operating_points: Sequence[Mapping[str, Any]] | None = None
-    names: Sequence[str] | None = None
-    modes: list[Mode] = field(init=False, repr=False)
-    signals: dict[str, list[dict[str, Any]]] = field(init=False, repr=False)
-
-    def __post_init__(self) -> None:
+    def __init__(
+        self,
+        systems: Any,  # noqa: ANN401  (any object with state-space matrices)
+        sample_time: float,
+        disturbance_inputs: Sequence[int | str] = (),
+        *,
+        continuous: bool = False,
+        inputs: Sequence[str | Mapping[str, Any]] | None = None,
+        outputs: Sequence[str | Mapping[str, Any]] | None = None,
+        states: Sequence[str | Mapping[str, Any]] | None = None,
+        operating_points: Sequence[Mapping[str, Any]] | None = None,
+        names: Sequence[str] | None = None,
+    ) -> None:
         """Turns every model into a mode."""
-        self.sample_time = _positive(self.sample_time, "sample_time")
-        systems = list(self.systems) if isinstance(self.systems, list) else [self.systems]
-        given = [matrices(system, f"systems[{number}]", continuous=self.continuous) for number, system in enumerate(systems)]
-        names = list(self.names) if self.names is not None else [f"mode {number}" for number in range(1, len(given) + 1)]
-        points = list(self.operating_points) if self.operating_points is not None else [None] * len(given)
+        self.sample_time = _positive(sample_time, "sample_time")
+        systems = list(systems) if isinstance(systems, list) else [systems]
+        given = [matrices(system, f"systems[{at}]", continuous=continuous) for at, system in enumerate(systems)]
+        if not given:
+            raise DesignFileError("systems is empty: give one model per mode", "systems")
+        names = list(names) if names is not None else [f"mode {number}" for number in range(1, len(given) + 1)]
+        points = list(operating_points) if operating_points is not None else [None] * len(given)
         for key, values in (("names", names), ("operating_points", points)):
             if len(values) != len(given):
                 raise DesignFileError(f"{key} has {len(values)} entries: give {len(given)}, one per mode", key)
-        self.modes = [self._mode(*parts) for parts in zip(given, names, points, strict=True)]
-        self.signals = self._signals(given)
-        del self.systems  # the modes say it all; models may be large or not picklable
+        self._disturbance_inputs = list(disturbance_inputs)
+        self.modes: list[Mode] = [self._mode(*parts) for parts in zip(given, names, points, strict=True)]
+        said = {"inputs": inputs, "outputs": outputs, "states": states}
+        self.signals: dict[str, list[dict[str, Any]]] = self._signals(given[0], said)
+
+    def __repr__(self) -> str:
+        """Returns one line: modes and sizes."""
+        first = self.modes[0]
+        (n, m), p, s = first.B.shape, len(first.C), first.E.shape[1]
+        return (
+            f"<ftc_fmu.Plant: {len(self.modes)} modes, {n} states, {m} inputs, {p} outputs, "
+            f"{s} disturbances, {self.sample_time} s>"
+        )
 
     def _mode(self, model: Matrices, name: str, point: Mapping[str, Any] | None) -> Mode:
         model = model.discretised(self.sample_time)
@@ -147,12 +158,12 @@ class Plant:
         """Columns of the inputs that are disturbances."""
         width = model.B.shape[1]
         columns = []
-        for given in self.disturbance_inputs:
+        for given in self._disturbance_inputs:
             if isinstance(given, str):
                 if given not in (model.inputs or []):
                     known = ", ".join(model.inputs or []) or "it has no names"
                     raise DesignFileError(
-                        f'disturbance_inputs: the model has no input "{given}" ({known}): give the number of its column',
+                        f'disturbance_inputs: the model has no input "{given}" ({known}): give the column',
                         "disturbance_inputs",
                     )
                 columns.append(model.inputs.index(given))
@@ -165,16 +176,14 @@ class Plant:
                 )
         return columns
 
-    def _signals(self, given: list[Matrices]) -> dict[str, list[dict[str, Any]]]:
+    def _signals(self, first: Matrices, said: Mapping[str, Any]) -> dict[str, list[dict[str, Any]]]:
         """The tables of `[signals]`: what was said, else the names that the first model has."""
-        first = given[0]
         disturbed = self._disturbed(first)
         labels = {
             "inputs": first.inputs and [name for column, name in enumerate(first.inputs) if column not in disturbed],
             "outputs": first.outputs,
             "states": first.states,
         }
-        said = {"inputs": self.inputs, "outputs": self.outputs, "states": self.states}
         tables = {}
         for key, label in labels.items():
             entries = said[key] if said[key] is not None else label
