@@ -1,11 +1,12 @@
 //! Designs: solved, read again, simulated, exported.
 
 use crate::controller::Controller;
-use crate::errors;
+use crate::errors::{self, Author};
 use crate::run::Run;
 use crate::waiting::wait;
 use ftc_design::DesignError;
 use ftc_design::assembly::{Request, assemble};
+use ftc_design::warnings::LoggedMovement;
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use pyo3::types::PyBytes;
@@ -27,7 +28,9 @@ pub struct Design(Arc<Made>);
 #[pyfunction]
 pub fn read_text(py: Python<'_>, path: PathBuf) -> PyResult<String> {
     let called = path.display().to_string();
-    design_file::load(&path).map_err(|what| errors::of_input(py, &what, None, Some(&called)))
+    design_file::load(&path).map_err(|what| {
+        errors::of_input(py, design_file::Error::of_file(what), Author::User(&called))
+    })
 }
 
 /// Designs what a text asks for; logs and tables are sought in `folder`. `called` is the name of
@@ -41,19 +44,18 @@ pub fn solve(
     called: Option<&str>,
     listener: Option<Py<PyAny>>,
 ) -> PyResult<Design> {
-    let written = called.map(|_| text);
-    let input = |what: String| errors::of_input(py, &what, written, called);
-    let file = design_file::parse(text).map_err(input)?;
-    let request = design_file::assemble::request(&file, &folder).map_err(input)?;
+    let author = called.map_or(Author::Package, Author::User);
+    let loaded =
+        design_file::parse(text, &folder).map_err(|error| errors::of_input(py, error, author))?;
     let what = "solving for gains and certifying them";
     let made = wait(py, what, listener.as_ref(), move || {
-        let logged = warnings::Logged::of(&request.estimator.database);
-        let design = assemble(request)?;
-        let warnings = warnings::of_design(&file, logged.as_ref(), &design);
+        let logged = LoggedMovement::of(&loaded.request.estimator.database);
+        let design = assemble(loaded.request)?;
+        let warnings = warnings::of_design(&loaded.file, logged.as_ref(), &design);
         Ok::<_, DesignError>(Made { design, warnings })
     })?;
     made.map(|made| Design(Arc::new(made)))
-        .map_err(|error| errors::of_design(py, &error, written, called))
+        .map_err(|error| errors::of_design(py, &error, text, author))
 }
 
 /// A design from its record.
@@ -118,7 +120,7 @@ impl Design {
         let simulated = wait(py, "simulating", None, move || {
             Run::of(&design, made.warnings.clone(), baselines)
         })?;
-        simulated.map_err(|what| errors::of_input(py, &what, None, None))
+        simulated.map_err(|what| errors::of_sentence(py, what))
     }
 
     /// Writes the FMUs; returns the paths.
@@ -152,7 +154,7 @@ impl Design {
 }
 
 fn requested(py: Python<'_>, text: &str, folder: &Path) -> PyResult<Request> {
-    design_file::parse(text)
-        .and_then(|file| design_file::assemble::request(&file, folder))
-        .map_err(|what| errors::of_input(py, &what, None, None))
+    design_file::parse(text, folder)
+        .map(|loaded| loaded.request)
+        .map_err(|error| errors::of_input(py, error, Author::Package))
 }

@@ -1,6 +1,5 @@
 //! Exceptions of `ftc_fmu.errors`, with the parts of their sentences.
 
-use crate::place;
 use ftc_design::DesignError;
 use pyo3::prelude::*;
 use pyo3::types::PyTuple;
@@ -22,39 +21,53 @@ fn make<'py>(
     }
 }
 
-/// What was given is at fault. `text` is the design file that the user wrote, `called` its name.
-pub fn of_input(py: Python<'_>, sentence: &str, text: Option<&str>, called: Option<&str>) -> PyErr {
-    let key = place::key(sentence);
-    let line = place::line(sentence).or_else(|| place::line_of(text?, key.as_deref()?));
-    let line = text.and(line);
-    // Lines of a text that the user never saw say nothing.
-    let sentence = match text {
-        Some(_) => sentence,
-        None => place::without_position(sentence),
+/// Who wrote the text of a design file.
+#[derive(Clone, Copy)]
+pub enum Author<'a> {
+    /// The user, in the file of this name.
+    User(&'a str),
+    /// This package: its user never saw a line.
+    Package,
+}
+
+/// What was given is at fault.
+pub fn of_input(py: Python<'_>, error: design_file::Error, author: Author<'_>) -> PyErr {
+    let (sentence, line) = match author {
+        Author::User(file) => (format!("{file}: {}", error.sentence), error.line),
+        Author::Package => (without_position(&error.sentence).to_string(), None),
     };
-    let sentence = match called {
-        Some(called) => format!("{called}: {sentence}"),
-        None => sentence.to_string(),
-    };
-    make(py, "DesignFileError", (sentence, key, line))
+    make(py, "DesignFileError", (sentence, error.key, line))
+}
+
+/// What was given is at fault, and no text of a design file holds it.
+pub fn of_sentence(py: Python<'_>, sentence: impl ToString) -> PyErr {
+    make(py, "DesignFileError", (sentence.to_string(),))
+}
+
+/// A sentence without the `line 3, column 7: ` that it may begin with.
+fn without_position(sentence: &str) -> &str {
+    let rest = sentence
+        .strip_prefix("line ")
+        .and_then(|rest| rest.split_once(", column "));
+    rest.and_then(|(_, rest)| rest.split_once(": "))
+        .map_or(sentence, |(_, rest)| rest)
 }
 
 /// There is no such controller.
-pub fn of_design(
-    py: Python<'_>,
-    error: &DesignError,
-    text: Option<&str>,
-    called: Option<&str>,
-) -> PyErr {
-    let sentence = match called {
-        Some(called) => format!("{called}: {error}"),
-        None => error.to_string(),
+pub fn of_design(py: Python<'_>, error: &DesignError, text: &str, author: Author<'_>) -> PyErr {
+    let sentence = match author {
+        Author::User(file) => format!("{file}: {error}"),
+        Author::Package => error.to_string(),
     };
     let advice = |advice: &[ftc_design::Advice]| -> Vec<String> {
         advice.iter().map(ToString::to_string).collect()
     };
     match error {
-        DesignError::Request(what) => of_input(py, &what.to_string(), text, called),
+        DesignError::Request(what) => of_input(
+            py,
+            design_file::Error::of_request(text, what.to_string()),
+            author,
+        ),
         DesignError::Infeasible(found) => {
             let blocks: Vec<(String, f64)> = found
                 .blocks

@@ -89,7 +89,7 @@ pub fn identify(
     })?;
     found
         .map(answer)
-        .map_err(|error| errors::of_input(py, &error.to_string(), None, None))
+        .map_err(|error| errors::of_sentence(py, error))
 }
 
 fn answer(found: Identified) -> Answer {

@@ -8,7 +8,6 @@ mod controller;
 mod design;
 mod errors;
 mod identification;
-mod place;
 mod run;
 mod waiting;
 
