@@ -2,9 +2,9 @@
 
 use crate::failure::Failure;
 use crate::summary;
-use ftc::design::DesignError;
-use ftc::design::as_printed::{PrintedVerdict, theorem_1, theorem_2};
-use ftc::design::assembly::Request;
+use ftc_design::DesignError;
+use ftc_design::as_printed::{PrintedVerdict, theorem_1, theorem_2};
+use ftc_design::assembly::Request;
 use serde_json::json;
 use std::fmt::Write;
 use std::path::Path;

@@ -11,13 +11,13 @@ use crate::design_file::schema::{
 use crate::design_file::signal::Signal as SignalOverTime;
 use crate::design_file::values::{NameOrList, NumberOrList};
 use crate::healthy_log::Logs;
-use ftc::control::parameters;
-use ftc::design::assembly::{DatabaseSource, EstimatorSpec, KnownDisturbance, Request, Threshold};
-use ftc::design::{ControlSpec, Lyapunov, Objective, ObserverSpec, Signal, Signals};
-use ftc::plant::{Dimensions, Mode, OperatingPoint, SwitchedPlant};
-use ftc::rows;
-use ftc::simulate::scenario::{ModeInterval, Waveform};
-use ftc::simulate::{Scenario, Truth};
+use ftc_control::parameters;
+use ftc_design::assembly::{DatabaseSource, EstimatorSpec, KnownDisturbance, Request, Threshold};
+use ftc_design::{ControlSpec, Lyapunov, Objective, ObserverSpec, Signal, Signals};
+use ftc_plant::rows;
+use ftc_plant::scenario::{ModeInterval, Waveform};
+use ftc_plant::{Dimensions, Mode, OperatingPoint, SwitchedPlant};
+use ftc_plant::{Scenario, Truth};
 use nalgebra::DMatrix;
 use std::path::Path;
 
@@ -443,7 +443,7 @@ fn weight(
 }
 
 fn observer(given: &schema::Observer, control: &ControlSpec) -> Result<ObserverSpec, String> {
-    use ftc::design::ObserverChoice as Kind;
+    use ftc_design::ObserverChoice as Kind;
     let decay = given.decay.unwrap_or(control.decay);
     at("observer.decay", check::decay(decay))?;
     Ok(ObserverSpec {
@@ -513,7 +513,7 @@ fn estimator(
         None => None,
         Some(length) => Some(at(
             "estimator.response_length",
-            check::count(length, 1, ftc::design::commissioning::LONGEST_RESPONSE),
+            check::count(length, 1, ftc_design::commissioning::LONGEST_RESPONSE),
         )?),
     };
     let debounce = match given.debounce {
@@ -704,7 +704,7 @@ impl Play<'_> {
         given.iter().enumerate().map(waveform).collect()
     }
 
-    fn events(&self) -> Result<Vec<ftc::simulate::scenario::FaultEvent>, String> {
+    fn events(&self) -> Result<Vec<ftc_plant::scenario::FaultEvent>, String> {
         let events = self.scenario.events.iter().flatten().enumerate();
         events
             .map(|(index, event)| {

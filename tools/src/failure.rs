@@ -1,7 +1,7 @@
 //! Why a command ends without success, and with which exit code.
 
 use crate::summary;
-use ftc::design::{ControlSpec, DesignError};
+use ftc_design::{ControlSpec, DesignError};
 use std::fmt;
 use std::path::Path;
 use std::process::ExitCode;

@@ -6,9 +6,9 @@
 
 use crate::design_file::{check, sentence, suggest, values::NameOrList};
 use csv::{ReaderBuilder, StringRecord, Trim};
-use ftc::design::commissioning::Database;
-use ftc::design::{Signal, Signals};
-use ftc::plant::{Mode, SwitchedPlant};
+use ftc_design::commissioning::Database;
+use ftc_design::{Signal, Signals};
+use ftc_plant::{Mode, SwitchedPlant};
 use nalgebra::DMatrix;
 use std::fs::File;
 use std::path::Path;

@@ -1,7 +1,7 @@
 //! `ftc-fmu`: from a design file to a certified controller, its FMUs and its simulation.
 //!
 //! ```text
-//! DESIGN.toml ── design_file ──> assemble ──> ftc::design ──┬─> report   (design)
+//! DESIGN.toml ── design_file ──> assemble ──> ftc_design ──┬─> report   (design)
 //!                                                           ├─> export   (two FMUs)
 //!                                                           └─> simulate (trajectories, metrics)
 //!                                         FMU ──────────────────> verify (the proof, once more)
@@ -33,8 +33,8 @@ mod warnings;
 use clap::{Parser, Subcommand};
 use design_file::schema::DesignFile;
 use failure::Failure;
-use ftc::design::Design;
-use ftc::design::assembly::Request;
+use ftc_design::Design;
+use ftc_design::assembly::Request;
 use progress::Progress;
 use reproduce::Experiment;
 use std::io::Write;
@@ -226,7 +226,7 @@ fn solve(path: &Path, progress: &Progress) -> Result<Made, Failure> {
     let asked = request.control.clone();
     let logged = warnings::Logged::of(&request.estimator.database);
     progress.tell("solving for gains and certifying them");
-    let design = ftc::design::assembly::assemble(request)
+    let design = ftc_design::assembly::assemble(request)
         .map_err(|error| Failure::new(path, asked, error))?;
     let warnings = warnings::of_design(&file, logged.as_ref(), &design);
     Ok(Made { design, warnings })

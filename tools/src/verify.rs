@@ -5,7 +5,7 @@ use crate::export::{KINDS, Kind};
 use crate::failure::Failure;
 use crate::platform::PLATFORMS;
 use crate::summary;
-use ftc::design::Design;
+use ftc_design::Design;
 use roxmltree::Document;
 use serde_json::json;
 use std::collections::BTreeMap;

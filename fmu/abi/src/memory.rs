@@ -40,7 +40,7 @@ static SERVED: AtomicUsize = AtomicUsize::new(0);
 static REQUESTED: AtomicUsize = AtomicUsize::new(0);
 
 static BLOCKS: Mutex<Blocks> = Mutex::new(Blocks { first: null_mut() });
-static BASE: Base = Base(UnsafeCell::new(Room([0; SMALL])));
+static BASE: Base = Base(UnsafeCell::new(Room { _bytes: [0; SMALL] }));
 
 /// A number that grows whenever memory is short; see [`short_of_memory`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -91,7 +91,9 @@ struct Blocks {
 unsafe impl Send for Blocks {}
 
 #[repr(align(64))]
-struct Room([u8; SMALL]);
+struct Room {
+    _bytes: [u8; SMALL],
+}
 
 struct Base(UnsafeCell<Room>);
 

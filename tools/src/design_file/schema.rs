@@ -6,7 +6,7 @@
 
 use super::signal::{Event, Signal};
 use super::values::{NameOrList, NumberOrList};
-use ftc::plant::rectifier::Rectifier;
+use ftc_plant::rectifier::Rectifier;
 use serde::Deserialize;
 
 /// A whole design file.

@@ -1,6 +1,6 @@
 //! Signals over time, and faults of sensors, as the user writes them.
 
-use ftc::simulate::scenario::{FaultEvent, FaultKind, Waveform};
+use ftc_plant::scenario::{FaultEvent, FaultKind, Waveform};
 use serde::de::value::MapAccessDeserializer;
 use serde::de::{Deserialize, Deserializer, Error, MapAccess, Visitor};
 use std::fmt;

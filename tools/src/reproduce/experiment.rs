@@ -3,11 +3,11 @@
 use crate::assemble;
 use crate::design_file;
 use crate::report::figure::{Dash, Figure, Ink, Mark, Point, Series, Weight};
-use ftc::design::assembly::{Request, assemble};
-use ftc::design::{Design, DesignError};
-use ftc::simulate::closed_loop::Record;
-use ftc::simulate::metrics::Merit;
-use ftc::simulate::{Trajectory, Variant};
+use ftc_design::assembly::{Request, assemble};
+use ftc_design::{Design, DesignError};
+use ftc_simulate::closed_loop::Record;
+use ftc_simulate::metrics::Merit;
+use ftc_simulate::{Trajectory, Variant};
 use serde::Serialize;
 use std::path::Path;
 

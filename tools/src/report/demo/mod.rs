@@ -11,8 +11,8 @@ use super::text::{self, count, list, number};
 use anyhow::{Context, Result};
 use events::Alarms;
 pub use figures::Scene;
-use ftc::design::{Design, Signal};
-use ftc::simulate::{Trajectory, Variant};
+use ftc_design::{Design, Signal};
+use ftc_simulate::{Trajectory, Variant};
 use std::io::Write as _;
 use std::path::Path;
 

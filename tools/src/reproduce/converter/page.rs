@@ -6,9 +6,10 @@ use crate::report::figure::{Figure, Ink, Series, Weight};
 use crate::report::page::{Block, Column, KeyNumber, Page, Row, Section, Table};
 use crate::report::text::{aligned, number, significant, with_unit};
 use crate::reproduce::experiment::{OutputMerits, curve, figure, reference, series};
-use ftc::design::Design;
-use ftc::simulate::closed_loop::Record;
-use ftc::simulate::{Trajectory, Truth, Variant};
+use ftc_design::Design;
+use ftc_plant::Truth;
+use ftc_simulate::closed_loop::Record;
+use ftc_simulate::{Trajectory, Variant};
 
 /// The two that are compared.
 const RIVALS: [Variant; 2] = [Variant::Ftc, Variant::Predictive];

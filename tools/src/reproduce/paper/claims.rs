@@ -4,7 +4,7 @@ use super::printed::{self, Absorption, DoubledDisturbance, Latency};
 use super::reachable::{REPORTED, largest_variance};
 use super::{Contender, NOISES, REFERENCES, Record};
 use crate::report::text::{aligned, number};
-use ftc::design::as_printed::PrintedVerdict;
+use ftc_design::as_printed::PrintedVerdict;
 use serde::Serialize;
 
 /// The numbers behind the claims, and the claims in words.
