@@ -215,7 +215,7 @@ mod tests {
             outputs: signals(3),
             states: signals(4),
             tracked: vec![0, 2],
-            disturbances: 1,
+            disturbances: vec![SignalInfo::default()],
             modes: 2,
             thresholds: vec![1.0; 3],
         };

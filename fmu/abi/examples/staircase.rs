@@ -78,6 +78,7 @@ pub fn table() -> VariableTable {
         nominal: None,
         min: None,
         max: None,
+        relative: false,
     };
     let ranged = Kind::Real {
         unit: None,
@@ -85,6 +86,7 @@ pub fn table() -> VariableTable {
         nominal: None,
         min: Some(-10.0),
         max: Some(10.0),
+        relative: false,
     };
     let integer = Kind::Integer {
         min: None,
@@ -232,7 +234,11 @@ impl Slave for Staircase {
         if reference == FAIL {
             return Err("asked to fail".into());
         }
-        assert_eq!(k, state.first + state.ticks, "ticks come in order, each once");
+        assert_eq!(
+            k,
+            state.first + state.ticks,
+            "ticks come in order, each once"
+        );
         let factor = self.factor(values)?.unwrap_or(0.0) * values.scalar(self.spans.gain);
         for (sum, input) in state.sum.iter_mut().zip(values.get(self.spans.input)) {
             // A NaN measurement arrives here as it is; this slave ignores it.

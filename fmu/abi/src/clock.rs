@@ -17,7 +17,7 @@
 //! **What is meant.** Importers round: 0.0166667 s for 1/60 s, 0.333 for a third. Time is kept
 //! as a whole number of ticks and a remainder of at most half a tick. Whenever the remainder is
 //! no more than [`MEANT`] of a tick (of the step, if that is longer), or the time since the start
-//! is that near to the same tick, the importer meant the tick itself and the remainder is
+//! agrees and is that near to the tick, the importer meant the tick itself and the remainder is
 //! dropped. So a step within a thousandth of `Te`, or of a whole multiple or fraction of it, is
 //! taken for it, and ten million of them are as many ticks: nothing adds up. A start time of 1e9
 //! costs no accuracy. Time follows the importer's own communication points.
@@ -245,7 +245,9 @@ impl Clock {
         let by_steps = (whole_step + resolution).min(length / 4.0);
         let by_time = (MEANT + resolution).min(length / 4.0);
         let elapsed = (self.now - self.start) / self.sample_time - self.ticks as f64;
-        if self.remainder.abs() <= by_steps || elapsed.abs() <= by_time {
+        // Steps that were taken for others have left the time since the start behind.
+        let agree = (elapsed - self.remainder).abs() <= 3.0 * MEANT;
+        if self.remainder.abs() <= by_steps || (agree && elapsed.abs() <= by_time) {
             self.remainder = 0.0;
         }
     }
