@@ -682,7 +682,10 @@ impl<S: Slave> Component<S> {
             return Err(Failure::out_of_memory());
         };
         let kept = make(self).map(Box::new);
-        if memory::short_of_memory(mark) || self.saved.try_reserve(1).is_err() {
+        let room = self.saved.try_reserve(1);
+        if memory::short_of_memory(mark) || room.is_err() {
+            // The list may have grown into the reserve.
+            self.saved.shrink_to_fit();
             return Err(Failure::out_of_memory());
         }
         let kept = kept?;
