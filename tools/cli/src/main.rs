@@ -223,6 +223,7 @@ fn export(made: &Made, out: &Path, ssp: bool) -> Result<String, Failure> {
     for path in &exported.paths {
         let _ = writeln!(text, "wrote {}", path.display());
     }
+    let _ = writeln!(text, "coupling: {}", exported.coupling);
     let platforms: Vec<String> = exported
         .packed
         .iter()
@@ -238,6 +239,7 @@ fn export(made: &Made, out: &Path, ssp: bool) -> Result<String, Failure> {
             "left out {platform}: its binaries are older than this program's: run make fmu-all"
         );
     }
+    text += &warnings::text(exported.misfit.as_slice());
     Ok(text + &warnings::text(&made.warnings))
 }
 

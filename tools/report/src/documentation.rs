@@ -2,6 +2,7 @@
 //! design report.
 
 use crate::Scene;
+use crate::connection::{self, Side};
 use crate::page::{Block, Page, Section};
 use crate::{simulate, summary};
 use ftc_design::Design;
@@ -19,7 +20,13 @@ pub fn runs(design: &Design) -> Vec<Trajectory> {
 }
 
 /// The page of one of the two FMUs, of which `title` and `lead` speak.
-pub fn page(design: &Design, runs: &[Trajectory], title: String, lead: String) -> String {
+pub fn page(
+    design: &Design,
+    runs: &[Trajectory],
+    side: Side,
+    title: String,
+    lead: String,
+) -> String {
     let scene = Scene::new(design, runs);
     let sections = [
         Section::new("Outputs")
@@ -37,9 +44,8 @@ pub fn page(design: &Design, runs: &[Trajectory], title: String, lead: String) -
     Page {
         title,
         lead,
-        sections: sections
-            .into_iter()
-            .filter(shows_something)
+        sections: std::iter::once(connection::section(design, side))
+            .chain(sections.into_iter().filter(shows_something))
             .chain(report)
             .collect(),
         footer: format!("Made by ftc-fmu {}.", env!("CARGO_PKG_VERSION")),

@@ -12,6 +12,7 @@
 
 mod axis;
 pub mod baselines;
+pub mod connection;
 mod decimate;
 mod demo;
 pub mod documentation;
