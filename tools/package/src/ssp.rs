@@ -438,7 +438,8 @@ mod tests {
         }
         assert!(connectors.contains(&("controller", "fault_real[3]")));
         let with_unit = elements("Real").filter(|node| node.attribute("unit") == Some("degC"));
-        assert_eq!(with_unit.count(), 11);
+        // y, f_hat, residual and threshold of the controller; y, y_true and f of the plant.
+        assert_eq!(with_unit.count(), 7);
         let units: Vec<_> = elements("Unit")
             .map(|node| {
                 let base = node.first_element_child().unwrap();
