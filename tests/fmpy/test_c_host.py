@@ -1,4 +1,8 @@
-"""A C program drives the exported FMUs: nothing depends on Rust or Python."""
+"""A C program drives the exported FMUs: nothing depends on Rust or Python.
+
+promise: independent-instances
+promise: memory-safety
+"""
 
 from __future__ import annotations
 
@@ -36,7 +40,10 @@ def test_eight_threads_at_once(tmp_path: Path, example_case: Callable[[str], Cas
 def test_memory_that_runs_out_is_an_answer(
     tmp_path: Path, example_case: Callable[[str], Case], which: str
 ) -> None:
-    """Each allocation fails in turn: NULL or fmi2Error, nothing leaks, and the next call succeeds."""
+    """Each allocation fails in turn: NULL or fmi2Error, nothing leaks, and the next call succeeds.
+
+    promise: short-memory
+    """
     fmu = getattr(example_case("paper").fmus, which)
     met = c_host.exhaust(c_host.build(tmp_path, "memory"), fmu)
     assert met["instantiate"] > 100

@@ -1,4 +1,6 @@
 //! Inputs that make no sense: handled or refused by name, and the instance goes on.
+//!
+//! promise: finite-plant
 
 use crate::Pair;
 use fmu_host::Coupling::GaussSeidel;
