@@ -8,8 +8,6 @@
  * With "warm" an instance is made first: a library that counts for tests has memory of its own
  * in each thread, which the C library cannot do without. Prints how many failures each operation met. The allocator of this program is the library's:
  * link with -rdynamic.
- *
- * promise: short-memory
  */
 #define _GNU_SOURCE
 #include <errno.h>
@@ -156,7 +154,7 @@ static void sweep(const char *name, void *(*operation)(void), void (*drop)(void 
             if (succeeds && (failures == 0 || all) && (made != NULL) != (failures == 0)) {
                 fprintf(stderr, "%s, allocation %ld: %ld failures, but the result is %p\n", name, k,
                         failures, made);
-                exit(1); /* a test has failed */
+                exit(1);
             }
             CHECK(made || !succeeds || sentences > 0);
             if (made) {
