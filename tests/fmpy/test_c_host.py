@@ -37,9 +37,7 @@ def test_eight_threads_at_once(tmp_path: Path, example_case: Callable[[str], Cas
 
 
 @pytest.mark.parametrize("which", ["controller", "plant"])
-def test_memory_that_runs_out_is_an_answer(
-    tmp_path: Path, example_case: Callable[[str], Case], which: str
-) -> None:
+def test_memory_that_runs_out_is_an_answer(tmp_path: Path, example_case: Callable[[str], Case], which: str) -> None:
     """Each allocation fails in turn: NULL or fmi2Error, nothing leaks, and the next call succeeds.
 
     promise: short-memory

@@ -20,7 +20,17 @@ STEPS = 60
 def build(folder: Path, name: str = "drive") -> Path:
     """Compiles a program, every warning an error."""
     program = folder / name
-    flags = ["-std=c11", "-D_POSIX_C_SOURCE=200809L", "-Wall", "-Wextra", "-Werror", "-O1", "-g", "-pthread", "-rdynamic"]
+    flags = [
+        "-std=c11",
+        "-D_POSIX_C_SOURCE=200809L",
+        "-Wall",
+        "-Wextra",
+        "-Werror",
+        "-O1",
+        "-g",
+        "-pthread",
+        "-rdynamic",
+    ]
     subprocess.run(["cc", *flags, "-o", program, SOURCES / f"{name}.c", "-ldl"], check=True)
     return program
 

@@ -229,7 +229,7 @@ impl Exporter<'_> {
     fn document(&self, kind: &Kind) -> String {
         let title = format!("{}: {}", self.design.name, kind.suffix);
         let lead = format!("{}.", kind.description);
-        documentation::page(self.design, &self.runs, kind.side, title, lead)
+        documentation::page(self.design, &self.runs, Some(kind.side), title, lead)
     }
 
     /// The SSP package: the FMUs under `resources/` beside the description of how they connect.

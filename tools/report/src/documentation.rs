@@ -19,11 +19,11 @@ pub fn runs(design: &Design) -> Vec<Trajectory> {
     shows.map(|variant| simulate::one(&shown, variant)).into()
 }
 
-/// The page of one of the two FMUs, of which `title` and `lead` speak.
+/// The page of one of the two FMUs, of which `title` and `lead` speak; without a side, of the design.
 pub fn page(
     design: &Design,
     runs: &[Trajectory],
-    side: Side,
+    side: Option<Side>,
     title: String,
     lead: String,
 ) -> String {
@@ -44,7 +44,9 @@ pub fn page(
     Page {
         title,
         lead,
-        sections: std::iter::once(connection::section(design, side))
+        sections: side
+            .map(|side| connection::section(design, side))
+            .into_iter()
             .chain(sections.into_iter().filter(shows_something))
             .chain(report)
             .collect(),
