@@ -45,6 +45,7 @@ fn paper(noise: f64) -> Design {
             inputs: signals(2, "u", None),
             outputs: signals(2, "y", None),
             states: signals(2, "x", None),
+            disturbances: Vec::new(),
         },
         controller,
         truth: Truth::default(),
@@ -86,6 +87,7 @@ fn lags(outputs: usize, disturbances: usize, steps: u64) -> Design {
             inputs: signals(outputs, "u", Some("V")),
             outputs: signals(outputs, "y", Some("A")),
             states: signals(outputs, "x", None),
+            disturbances: Vec::new(),
         },
         controller: ControllerParameters {
             feedback: StateFeedback {
