@@ -1,4 +1,6 @@
 //! Observers without some of their sensors: served, proved, blind to what is lost.
+//!
+//! promise: lost-sensors
 
 mod plants;
 

@@ -1,4 +1,7 @@
-"""Claims proved once more in rational arithmetic: the loop formed of the very doubles that ship, pivots without rounding."""
+"""Claims proved once more in rational arithmetic: the loop formed of the very doubles that ship, pivots without rounding.
+
+promise: running-loop
+"""
 
 from __future__ import annotations
 

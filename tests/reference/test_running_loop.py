@@ -1,4 +1,8 @@
-"""What is claimed of the loop that runs, against the same figures computed from the shipped numbers by other means."""
+"""What is claimed of the loop that runs, against the same figures computed from the shipped numbers by other means.
+
+promise: running-loop
+promise: lost-sensors
+"""
 
 from __future__ import annotations
 

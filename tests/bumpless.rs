@@ -1,0 +1,175 @@
+//! Bumpless transfer under every switching: the command is continuous where it may be, and the loop that
+//! once reached 1e15 stays where it belongs.
+//!
+//! promise: bumpless
+#![allow(missing_docs)]
+
+use ftc_control::parameters::{Compensation, EstimatorMethod};
+use ftc_control::{Compensate, Controller, Sample};
+use ftc_design::assembly::{DatabaseSource, EstimatorSpec, Request, Threshold, assemble};
+use ftc_design::{
+    ControlSpec, Design, Lyapunov, Objective, ObserverChoice, ObserverSpec, Signal, Signals,
+};
+use ftc_plant::scenario::{ModeInterval, Waveform};
+use ftc_plant::{Mode, OperatingPoint, Scenario, SwitchedPlant, Truth};
+use nalgebra::{DMatrix, DVector};
+
+fn single(value: f64) -> DMatrix<f64> {
+    DMatrix::from_element(1, 1, value)
+}
+
+/// Two unstable modes of first order.
+fn plant() -> SwitchedPlant {
+    let mode = |a: f64| Mode {
+        name: format!("{a}"),
+        a: single(a),
+        b: single(1.0),
+        c: single(1.0),
+        e: single(1.0),
+        f: single(0.0),
+        operating_point: OperatingPoint::zero(1, 1, 1),
+    };
+    SwitchedPlant {
+        sample_time: 1.0,
+        modes: vec![mode(1.2), mode(1.25)],
+    }
+}
+
+fn request(lyapunov: Lyapunov, bumpless: bool) -> Request {
+    let signals = |name: &str| {
+        vec![Signal {
+            name: name.into(),
+            unit: None,
+            nominal: 1.0,
+            min: None,
+            max: None,
+        }]
+    };
+    Request {
+        name: "bump".into(),
+        signals: Signals {
+            inputs: signals("u"),
+            outputs: signals("y"),
+            states: signals("x"),
+        },
+        plant: plant(),
+        truth: Truth::AsDesigned,
+        control: ControlSpec {
+            tracked: vec![0],
+            latency: 0,
+            lyapunov,
+            decay: 0.9,
+            objective: Objective::Attenuation,
+            resonators: Vec::new(),
+            output_weight: vec![1.0],
+            integral_weight: vec![0.3],
+            input_weight: vec![0.1],
+        },
+        bumpless,
+        feedforward: false,
+        observer: ObserverSpec {
+            kind: ObserverChoice::Luenberger,
+            decay: 0.6,
+            lyapunov,
+            noise: Vec::new(),
+        },
+        estimator: EstimatorSpec {
+            method: EstimatorMethod::None,
+            response_length: None,
+            database: DatabaseSource::Model,
+            threshold: Threshold::Sigmas(6.0),
+            debounce: 1,
+            stuck_after: 0,
+            adapt: false,
+            disturbance: None,
+        },
+        compensation: Compensation::None,
+        scenario: Scenario {
+            steps: 200,
+            noise: vec![0.0],
+            seed: 1,
+            schedule: vec![ModeInterval { from: 0.0, mode: 0 }],
+            reference: vec![Waveform::ZERO],
+            fault: vec![Waveform::ZERO],
+            events: Vec::new(),
+            disturbance: vec![Waveform::ZERO],
+        },
+    }
+}
+
+/// The largest output and the largest jumps of the command at switches that may and may not be smooth,
+/// when the mode changes every `period` samples.
+fn run(design: &Design, period: usize) -> (f64, f64) {
+    let controller = Controller::new(design.controller.clone());
+    let modes = &design.controller.plant.modes;
+    let mut state = controller.initial_state(0);
+    let mut x = DVector::from_element(1, 0.0);
+    let (mut largest, mut jump, mut before) = (0.0_f64, 0.0_f64, 0.0);
+    for k in 0..3000_usize {
+        let mode = (k / period) % 2;
+        let w = 0.01 * (0.314 * k as f64).sin();
+        controller.tick(
+            &mut state,
+            &Sample {
+                tick: k as u64,
+                mode,
+                measurement: &[x[0]],
+                reference: &[1.0],
+                thresholds: &[1.0],
+                compensate: Compensate::Nothing,
+            },
+        );
+        let u = state.command[0];
+        if k > 0 && k % period == 0 {
+            jump = jump.max((u - before).abs());
+        }
+        before = u;
+        x = &modes[mode].a * &x + &modes[mode].b * u + &modes[mode].e * w;
+        largest = largest.max(x[0].abs());
+    }
+    (largest, jump)
+}
+
+#[test]
+fn switched_at_every_sample_the_loop_stays_bounded() {
+    let design = assemble(request(Lyapunov::Common, true)).unwrap();
+    let transfer = design.controller.feedback.transfer.unwrap();
+    assert!(transfer.samples > 1, "{transfer:?}");
+    for period in [1, 2, 3, 7, transfer.samples, 40] {
+        let (largest, _) = run(&design, period);
+        assert!(largest < 5.0, "|y| reaches {largest} at period {period}");
+    }
+}
+
+#[test]
+fn switches_far_enough_apart_leave_the_command_where_it_was() {
+    let samples = |design: &Design| design.controller.feedback.transfer.unwrap().samples;
+    for lyapunov in [Lyapunov::Common, Lyapunov::Dwell] {
+        let smooth = assemble(request(lyapunov, true)).unwrap();
+        let (_, jump) = run(&smooth, samples(&smooth));
+        assert!(jump < 1e-12, "{lyapunov}: the command jumps by {jump}");
+    }
+    let plain = assemble(request(Lyapunov::Common, false)).unwrap();
+    assert!(run(&plain, 40).1 > 1e-3);
+}
+
+/// More resets than were proved, and no proof at all, are refused.
+#[test]
+fn resets_more_often_than_proved_are_refused() {
+    let design = assemble(request(Lyapunov::Common, true)).unwrap();
+    ftc_design::coverage::check(&design).unwrap();
+    let plant = &design.controller.plant;
+    design.synthesis.as_ref().unwrap().verify(plant).unwrap();
+
+    let mut hasty = design.clone();
+    hasty.controller.feedback.transfer.as_mut().unwrap().samples = 1;
+    let sentence = ftc_design::coverage::check(&hasty).unwrap_err();
+    assert!(sentence.contains("bumpless"), "{sentence}");
+    let synthesis = hasty.synthesis.as_mut().unwrap();
+    synthesis.running_loop.transfer.as_mut().unwrap().samples = 1;
+    assert!(synthesis.verify(plant).is_err());
+
+    let mut unproved = design;
+    unproved.synthesis.as_mut().unwrap().running_loop.transfer = None;
+    assert!(ftc_design::coverage::check(&unproved).is_err());
+}
