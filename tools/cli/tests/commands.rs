@@ -381,6 +381,32 @@ fn an_fmu_holds_every_platform_that_is_there_and_belongs_to_its_design() {
     }
 }
 
+/// Binaries of another platform that are older than those of this machine were made from other sources.
+#[cfg(target_os = "linux")]
+#[test]
+fn binaries_older_than_those_of_this_machine_are_left_out() {
+    use std::time::{Duration, SystemTime};
+    let bench = Bench::new(SOUND);
+    let others = [
+        "fmu-binaries/win64/ftc_controller.dll",
+        "fmu-binaries/win64/ftc_plant.dll",
+    ];
+    let own = ["libftc_controller_fmu.so", "libftc_plant_fmu.so"];
+    let program = installed(&bench, &[own, others].concat());
+    for library in others {
+        let path = bench.path("bin").join(library);
+        let file = fs::File::options().write(true).open(path).unwrap();
+        file.set_modified(SystemTime::now() - Duration::from_secs(60))
+            .unwrap();
+    }
+    let output = export(&bench, &program, "out");
+    let said = String::from_utf8(output.stdout).unwrap();
+    assert!(said.contains("(built for this machine)"), "{said}");
+    assert!(said.contains("left out win64"), "{said}");
+    let files = unzip(&bench.path("out/sound_plant.fmu"));
+    assert!(!files.keys().any(|name| name.contains("win64")));
+}
+
 #[test]
 fn the_same_design_gives_the_same_bytes() {
     let bench = Bench::new(SOUND);
