@@ -242,7 +242,7 @@ fn a_second_run_replaces_the_first() {
     assert_eq!(bench.files().len(), first.len() + 1);
 }
 
-/// A directory that bears the name of a file to be written is named, and no file is left behind.
+/// A directory that has the name of a file to be written is named, and no file is left behind.
 #[test]
 fn all_files_or_none() {
     let bench = Bench::new(SOUND);
@@ -499,7 +499,7 @@ fn baselines_are_written_beside_the_variants() {
         let bound = mse("deadbeat_bound");
         assert_eq!(bound.len(), 2);
         assert!(bound.iter().all(|&bound| bound > 0.0));
-        // Nobody follows faster than the plant can. Between jumps 10 samples apart, an output that
+        // No controller follows faster than the plant allows. Between jumps 10 samples apart, an output that
         // never quite arrives may save a tenth: min over e of (1 - e)^2 + 9 e^2 is 0.9.
         for key in ["ftc", "told_the_fault", "additive", "mpc"] {
             for (found, least) in mse(key).iter().zip(&bound) {
