@@ -109,7 +109,7 @@ pub fn modes(design: &Design) -> Table {
         .enumerate()
         .map(|(index, mode)| {
             vec![
-                super::facts::mode_name(modes, index),
+                super::mode_name(modes, index),
                 number(mode.spectral_radius()),
             ]
         })
