@@ -278,3 +278,64 @@ fn a_constant_reference_has_no_vaf() {
     assert!(row(&constant, " a ")[4].parse::<f64>().is_ok());
     assert!(row(SOUND, " b ")[4].parse::<f64>().is_ok());
 }
+
+#[test]
+fn an_input_at_its_limits_and_a_noisy_command_are_named() {
+    let tight = damaged(
+        "[signals]\n",
+        "[signals]\ninputs = [{ name = \"valve\", min = -0.05, max = 0.05 }, { name = \"pump\", nominal = 0.01 }]\n",
+    );
+    let warnings = of_run(&Bench::new(tight), &[]);
+    let named = |words: &[&str]| {
+        let all = |warning: &String| words.iter().all(|word| warning.contains(word));
+        assert!(warnings.iter().any(all), "no {words:?} in {warnings:?}");
+    };
+    named(&["ftc: valve is at a limit in ", "% of the samples"]);
+    named(&["noise of the sensors moves pump by "]);
+}
+
+#[test]
+fn weights_without_effect_are_named() {
+    let decay = damaged("decay = 0.7\n", "decay = 0.7\nobjective = \"decay\"\n");
+    one(
+        &of_design(&Bench::new(decay)),
+        &[
+            "controller.output_weight, controller.integral_weight, controller.input_weight have no effect",
+            "objective",
+        ],
+    );
+}
+
+/// Without E and F a disturbance at the inputs is assumed and said, and the weights shape the gains.
+#[test]
+fn weights_act_without_a_known_disturbance() {
+    let unknown = SOUND
+        .replace("E = [[1.0], [1.0]]\n", "")
+        .replace(
+            "disturbance = [{ kind = \"sine\", amplitude = 0.04, period = 314 }]\n",
+            "",
+        )
+        .replace("[disturbance]\nperiod = 314.0\nharmonics = 1\n", "")
+        .replace("kind = \"uio\"", "kind = \"auto\"");
+    let design = |text: &str| {
+        let bench = Bench::new(text);
+        let run = bench.run(&["design", FILE, "--json"]);
+        assert_eq!(run.code(), 0, "{}", run.stderr());
+        let said = bench.run(&["design", FILE]).stdout();
+        assert!(
+            said.contains("one at the inputs (E = B) is assumed"),
+            "{said}"
+        );
+        run.json()
+    };
+    let usual = design(&unknown);
+    let costly =
+        design(&unknown.replace("input_weight = [0.1, 0.1]", "input_weight = [10.0, 10.0]"));
+    assert_eq!(usual["disturbance"], "assumed at the inputs (B)");
+    let noise = |report: &serde_json::Value| report["noise_gain"][0].as_f64().unwrap();
+    assert!(usual["gamma_loop"][0].as_f64().unwrap() > 0.0);
+    assert!(
+        (noise(&usual) - noise(&costly)).abs() > 1e-3,
+        "the weights shape nothing"
+    );
+}
