@@ -99,6 +99,10 @@ pub fn modes(design: &Design) -> Table {
         .synthesis
         .as_ref()
         .map(|synthesis| &synthesis.state_feedback);
+    let running = design
+        .synthesis
+        .as_ref()
+        .map(|synthesis| &synthesis.running_loop);
     let gamma = control.and_then(|control| control.gamma.as_ref());
     let mut columns = vec![
         Column::name("mode"),
@@ -126,9 +130,17 @@ pub fn modes(design: &Design) -> Table {
     }
     if let Some(gamma) = gamma {
         append(
-            "certified γ",
+            "γ, state known",
             gamma.iter().map(|value| aligned(*value, 4)).collect(),
         );
+    }
+    if let Some(running) = running {
+        let column = |values: &[f64]| values.iter().map(|value| aligned(*value, 4)).collect();
+        if let Some(gamma) = &running.gamma_loop {
+            append("γ of the running loop", column(gamma));
+        }
+        append("noise gain", column(&running.noise_gain));
+        append("gain of an unnoticed fault", column(&running.fault_gain));
     }
     if controller.estimator.method == EstimatorMethod::Reference {
         let samples = controller
@@ -138,8 +150,9 @@ pub fn modes(design: &Design) -> Table {
             .map(|p| p.samples.to_string());
         append("samples in its healthy database", samples.collect());
     }
-    let note = "γ bounds the l2 gain from the disturbance to the weighted outputs, tracking-error integrals and inputs; \
-                it is proved for the gains as shipped, rounding included.";
+    let note = "γ bounds the l2 gain from the disturbance to the weighted outputs, tracking-error integrals and inputs, \
+                with a state that is known and of the loop that runs; the noise gain and that of an unnoticed fault \
+                lead to the true tracking error. All are proved for the gains as shipped, rounding included.";
     Table {
         caption: "Modes".into(),
         columns,
