@@ -6,7 +6,7 @@
 //! promise: changed-numbers
 #![allow(missing_docs)]
 
-use ftc_design::{Design, coverage};
+use ftc_design::{Design, Synthesis, coverage};
 use serde_json::{Number, Value};
 use std::path::Path;
 
@@ -185,16 +185,19 @@ fn what_decides_the_command_is_derived_again() {
 /// Units so large that a gain vanishes in them hide nothing.
 #[test]
 fn a_unit_that_underflows_is_refused() {
+    let original = design("paper.toml");
     for exponent in [1023, -1022, 300] {
-        let mut design = design("paper.toml");
-        let synthesis = design.synthesis.as_mut().unwrap();
-        synthesis.state_feedback.certificate.units.inputs[0] = 2f64.powi(exponent);
-        let sentence = proves(&design).unwrap_err();
-        assert!(sentence.contains("units"), "{sentence}");
-        let mut design = self::design("paper.toml");
-        let synthesis = design.synthesis.as_mut().unwrap();
-        synthesis.observer.certificate.states[0] = 2f64.powi(exponent);
-        let sentence = proves(&design).unwrap_err();
-        assert!(sentence.contains("units"), "{sentence}");
+        let unit = 2f64.powi(exponent);
+        let refused = |change: &dyn Fn(&mut Synthesis)| {
+            let mut design = original.clone();
+            change(design.synthesis.as_mut().unwrap());
+            assert!(proves(&design).is_err());
+            let synthesis = design.synthesis.unwrap();
+            let error = synthesis.verify(&original.controller.plant).unwrap_err();
+            assert!(error.to_string().contains("units"), "{error}");
+        };
+        refused(&|synthesis| synthesis.state_feedback.certificate.units.inputs[0] = unit);
+        refused(&|synthesis| synthesis.state_feedback.certificate.units.performance = unit);
+        refused(&|synthesis| synthesis.observer.certificate.states[0] = unit);
     }
 }

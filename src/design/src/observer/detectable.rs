@@ -20,6 +20,10 @@ pub(crate) fn check_detectable(a: &DMatrix<f64>, c: &DMatrix<f64>, decay: f64) -
             }
             false => Complex::from(c[(r - n, k)]),
         });
+        // The decomposition panics on what is not a number.
+        if !pencil.iter().all(|value| value.norm() < 1e150) {
+            return Err(f64::INFINITY);
+        }
         let values = pencil.singular_values();
         if values.min() <= 1e-9 * values.max() {
             return Err(lambda.norm());

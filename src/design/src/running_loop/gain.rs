@@ -150,9 +150,12 @@ impl Channel<'_> {
             return f64::INFINITY;
         };
         let response = complex(self.c.midpoint()) * inner + complex(self.d.midpoint());
-        match response.is_empty() {
-            true => 0.0,
-            false => response.singular_values().max(),
+        // The decomposition panics on what is not a number.
+        let finite = response.iter().all(|value| value.norm() < 1e150);
+        match (response.is_empty(), finite) {
+            (true, _) => 0.0,
+            (false, true) => response.singular_values().max(),
+            (false, false) => f64::INFINITY,
         }
     }
 
