@@ -4,6 +4,8 @@
 //! residual alone tells this late, and not at all while the true output happens to pass by.
 
 use super::compensation::is_measurement;
+use alloc::vec;
+use alloc::vec::Vec;
 use serde::{Deserialize, Serialize};
 
 /// What a silent sensor says: no measurement, yet equal to itself.

@@ -1,0 +1,17 @@
+//! Between the matrices that are computed with off line and those that run on line: entry by entry,
+//! nothing is rounded.
+
+use ftc_control::Matrix;
+use nalgebra::DMatrix;
+
+/// The matrix as the on-line controller holds it.
+pub fn plain(matrix: &DMatrix<f64>) -> Matrix {
+    Matrix::from_fn(matrix.nrows(), matrix.ncols(), |row, column| {
+        matrix[(row, column)]
+    })
+}
+
+/// The matrix as it is computed with off line.
+pub fn dense(matrix: &Matrix) -> DMatrix<f64> {
+    DMatrix::from_column_slice(matrix.nrows(), matrix.ncols(), matrix.as_slice())
+}
