@@ -19,7 +19,7 @@ pub fn read_design(bytes: &[u8]) -> Result<Design, String> {
 
 impl From<&Design> for Interface {
     fn from(design: &Design) -> Self {
-        let plant = &design.controller.plant;
+        let plant = &design.plant;
         let sample_time = plant.sample_time;
         let first = design.scenario.mode(0, sample_time);
         let point = plant.modes.get(first).map(|mode| &mode.operating_point);

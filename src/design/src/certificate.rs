@@ -18,12 +18,13 @@ pub use enclosure::Enclosure;
 
 use super::augmented::{AugmentedMode, augment, scaled};
 use super::lyapunov::all_pairs;
+use super::matrices::dense;
 use super::observer::ObserverDesign;
 use super::state_feedback::{ModeGains, StateFeedback};
 use super::units::power_of_two;
 use super::verdict::{BlockKind, BlockName};
 use super::{ControlSpec, DwellTime, Lyapunov, Units};
-use ftc_control::parameters::Gain;
+use ftc_control::Matrix;
 use ftc_plant::rows;
 use ftc_plant::{Dimensions, SwitchedPlant};
 use nalgebra::DMatrix;
@@ -306,8 +307,8 @@ fn error_dynamics(plant: &SwitchedPlant, design: &ObserverDesign, i: usize, j: u
     };
     let (own, next) = (&plant.modes[i], &plant.modes[j]);
     let a = matrix(&own.a, states, states);
-    let gain = matrix(&design.observer.gains[i].0, states, outputs);
-    let decoupling = matrix(&design.observer.decoupling[i][j].0, states, outputs);
+    let gain = matrix(&dense(&design.observer.gains[i]), states, outputs);
+    let decoupling = matrix(&dense(&design.observer.decoupling[i][j]), states, outputs);
     let seen = &matrix(&next.c, outputs, states) * &a;
     let injected = &gain * &matrix(&own.c, outputs, states);
     &(&a - &(&decoupling * &seen)) - &injected
@@ -428,7 +429,7 @@ fn check_observer_sizes(
     design.spec.check().map_err(malformed)?;
     let (n, p, modes) = (dims.states, dims.outputs, plant.modes.len());
     let (observer, certificate) = (&design.observer, &design.certificate);
-    let fits = |gain: &Gain| gain.0.shape() == (n, p);
+    let fits = |gain: &Matrix| gain.shape() == (n, p);
     let gains_fit = observer.gains.len() == modes
         && observer.decoupling.len() == modes
         && observer.decoupling.iter().all(|row| row.len() == modes)

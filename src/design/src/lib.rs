@@ -16,6 +16,7 @@ pub mod harmonics;
 #[cfg(feature = "solver")]
 pub mod lmi;
 mod lyapunov;
+mod matrices;
 pub mod observer;
 mod record;
 mod spec;
@@ -32,8 +33,9 @@ use serde::{Deserialize, Serialize};
 pub use certificate::{CertificateError, ControlCertificate};
 pub use controllability::check_controllable;
 pub use lyapunov::{DwellTime, Lyapunov};
+pub use matrices::{dense, mode_models, plain};
 pub use observer::{ObserverCertificate, ObserverDesign};
-pub use record::{Design, FORMAT, Signal, Signals};
+pub use record::{ControllerDesign, Design, FORMAT, Signal, Signals};
 pub use spec::{ControlSpec, Objective, ObserverChoice, ObserverSpec};
 pub use state_feedback::{ModeGains, StateFeedback};
 pub use units::Units;

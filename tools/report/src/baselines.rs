@@ -18,11 +18,15 @@ const LEAST_NOISE: f64 = 1e-3;
 pub fn trajectories(design: &Design, plant: &PlantSimulator) -> Result<Vec<Trajectory>, String> {
     let parameters =
         additive(design).map_err(|error: DesignError| format!("the additive baseline: {error}"))?;
-    let printed = run(plant, &Controller::new(parameters), Variant::Additive);
+    let printed = run(
+        plant,
+        &Controller::new(parameters).expect("a finished design has matching sizes"),
+        Variant::Additive,
+    );
     let delayed = design.controller.feedback.latency > 0;
     let spec = predictive(design, &printed)?;
     let mode = plant.initial_state().mode;
-    let mut controller = Predictive::new(&design.controller.plant, &spec, mode)
+    let mut controller = Predictive::new(&design.plant, &spec, mode)
         .map_err(|what| format!("the predictive baseline: {what}"))?;
     if delayed {
         controller = controller.one_sample_late();
@@ -42,7 +46,7 @@ fn predictive(design: &Design, played: &Trajectory) -> Result<PredictiveSpec, St
         .spec;
     let outputs = design.signals.outputs.iter();
     let noise = outputs.zip(&design.scenario.noise);
-    let channels = design.controller.plant.dimensions().disturbances;
+    let channels = design.plant.dimensions().disturbances;
     let power = |channel: usize| {
         let records = &played.records;
         let sum: f64 = records.iter().map(|r| r.disturbance[channel].powi(2)).sum();
@@ -69,7 +73,7 @@ pub fn bound(design: &Design, played: &Trajectory) -> Vec<f64> {
         .map(|(index, &output)| {
             let reference: Vec<f64> = played.records.iter().map(|r| r.reference[index]).collect();
             let start = played.records.first().map_or(0.0, |r| r.y_true[output]);
-            let delay = response_delay(&design.controller.plant, output) + feedback.latency;
+            let delay = response_delay(&design.plant, output) + feedback.latency;
             deadbeat_bound(&reference, start, delay)
         })
         .collect()

@@ -45,7 +45,7 @@ fn line(name: impl Into<String>, value: impl Into<String>) -> (String, String) {
 }
 
 fn overview(design: &Design) -> Vec<(String, String)> {
-    let plant = &design.controller.plant;
+    let plant = &design.plant;
     let dims = plant.dimensions();
     let names: Vec<&str> = plant.modes.iter().map(|mode| mode.name.as_str()).collect();
     vec![
@@ -106,7 +106,7 @@ fn attenuation(control: &StateFeedback, mode: usize) -> String {
 
 /// The periods at which the tracking error vanishes beside its constant part.
 fn internal_model(design: &Design, control: &StateFeedback) -> Option<(String, String)> {
-    let sample_time = design.controller.plant.sample_time;
+    let sample_time = design.plant.sample_time;
     let angles = control.spec.resonators.iter();
     let periods: Vec<String> = angles
         .map(|angle| format!("{:.6} s", core::f64::consts::TAU / angle * sample_time))

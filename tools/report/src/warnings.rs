@@ -7,13 +7,14 @@ use design_file::healthy_log::file_of;
 use design_file::schema::{DesignFile, EstimatorMethod as Asked};
 use design_file::sentence::shorten;
 use design_file::values::NameOrList;
+use ftc_control::Matrix;
 use ftc_control::estimator::{InputHistory, leverage};
 use ftc_control::parameters::{Estimator, EstimatorMethod, Predictor};
 use ftc_design::Design;
 use ftc_design::assembly::DatabaseSource;
 use ftc_design::commissioning::{Database, model_predictor};
 use ftc_plant::Mode;
-use ftc_plant::Truth;
+use ftc_plant::TruePlant;
 use ftc_plant::scenario::first_tick;
 use ftc_simulate::closed_loop::Record;
 use ftc_simulate::{Trajectory, Variant};
@@ -107,7 +108,7 @@ struct Lasting(Vec<u64>);
 
 impl Lasting {
     fn of(design: &Design) -> Self {
-        let te = design.controller.plant.sample_time;
+        let te = design.plant.sample_time;
         let scenario = &design.scenario;
         let mut switches = vec![0];
         for pair in scenario.schedule.windows(2) {
@@ -214,8 +215,8 @@ impl<'a> Steady<'a> {
 /// Modes in which the references need inputs that the database does not span.
 fn outside_the_database(design: &Design) -> Vec<String> {
     let controller = &design.controller;
-    let (scenario, te) = (&design.scenario, controller.plant.sample_time);
-    let modes = controller.plant.modes.iter();
+    let (scenario, te) = (&design.scenario, design.plant.sample_time);
+    let modes = design.plant.modes.iter();
     let steady: Vec<Option<Steady>> = modes
         .zip(&controller.estimator.predictors)
         .map(|(mode, predictor)| Steady::new(mode, predictor, &controller.feedback.tracked))
@@ -243,7 +244,7 @@ fn outside_the_database(design: &Design) -> Vec<String> {
 /// Names the input that goes farthest.
 fn beyond(design: &Design, mode: usize, u: &DVector<f64>, times: f64) -> String {
     let inputs = &design.signals.inputs;
-    let point = &design.controller.plant.modes[mode].operating_point.u;
+    let point = &design.plant.modes[mode].operating_point.u;
     let farthest = |&input: &usize| ((u[input] - point[input]) / inputs[input].nominal).abs();
     let input = (0..u.len())
         .max_by(|a, b| farthest(a).total_cmp(&farthest(b)))
@@ -262,7 +263,7 @@ fn beyond(design: &Design, mode: usize, u: &DVector<f64>, times: f64) -> String 
 fn doubtful_logs(files: &NameOrList, logged: &Logged, design: &Design) -> Vec<String> {
     let controller = &design.controller;
     let mut warnings = Vec::new();
-    for (index, (mode, predictor)) in controller
+    for (index, (mode, predictor)) in design
         .plant
         .modes
         .iter()
@@ -273,9 +274,9 @@ fn doubtful_logs(files: &NameOrList, logged: &Logged, design: &Design) -> Vec<St
         let length = controller.estimator.response_length;
         let model = model_predictor(mode, length, &units, &predictor.deviation).response;
         for (output, signal) in design.signals.outputs.iter().enumerate() {
-            let row = |response: &DMatrix<f64>| -> Vec<f64> {
+            let row = |response: &Matrix| -> Vec<f64> {
                 let row = response.row(output);
-                let scaled = row.iter().zip(units.iter().cycle());
+                let scaled = row.zip(units.iter().cycle());
                 scaled.map(|(value, unit)| value * unit).collect()
             };
             let moved = logged.0[index][output];
@@ -376,7 +377,7 @@ impl Far {
     /// Plays the inputs of a run once more.
     fn of(design: &Design, run: &Trajectory) -> Self {
         let controller = &design.controller;
-        let (estimator, modes) = (&controller.estimator, &controller.plant.modes);
+        let (estimator, modes) = (&controller.estimator, &design.plant.modes);
         let mut far = Self {
             samples: 0,
             widening: 1.0,
@@ -404,7 +405,7 @@ impl Far {
 
 /// A run that ended in equations without a solution.
 fn stalled(design: &Design, run: &Trajectory) -> Option<String> {
-    let time = run.stalled? as f64 * design.controller.plant.sample_time;
+    let time = run.stalled? as f64 * design.plant.sample_time;
     Some(format!(
         "{}: the plant's equations cannot be integrated beyond {time} s: the figures end there",
         run.variant.key()
@@ -413,7 +414,7 @@ fn stalled(design: &Design, run: &Trajectory) -> Option<String> {
 
 /// A rectifier that fell to where it no longer is the one of the design.
 fn held_up(design: &Design, run: &Trajectory) -> Option<String> {
-    let Truth::Rectifier(rectifier) = &design.truth else {
+    let TruePlant::Rectifier(rectifier) = &design.true_plant else {
         return None;
     };
     let floor = rectifier.diode_voltage();
@@ -424,7 +425,7 @@ fn held_up(design: &Design, run: &Trajectory) -> Option<String> {
         "{}: the DC link fell to where its diodes conduct, below {floor:.1} V, at {} s, and was there in {:.1} % of \
          the samples",
         run.variant.key(),
-        first.tick as f64 * design.controller.plant.sample_time,
+        first.tick as f64 * design.plant.sample_time,
         100.0 * count as f64 / run.records.len() as f64
     ))
 }

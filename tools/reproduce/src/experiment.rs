@@ -83,8 +83,8 @@ pub fn reference(points: Vec<Point>) -> Series {
 
 /// Vertical lines where the mode changes.
 pub fn switches(run: &Trajectory, design: &Design) -> Vec<Mark> {
-    let te = design.controller.plant.sample_time;
-    let modes = &design.controller.plant.modes;
+    let te = design.plant.sample_time;
+    let modes = &design.plant.modes;
     run.records
         .windows(2)
         .filter(|pair| pair[0].mode != pair[1].mode)
@@ -102,7 +102,7 @@ pub fn figure(
     (key, title, label): (String, String, String),
     intervals: &[[usize; 2]],
 ) -> Figure {
-    let te = design.controller.plant.sample_time;
+    let te = design.plant.sample_time;
     let shaded = intervals
         .iter()
         .map(|interval| interval.map(|index| index as f64 * te))

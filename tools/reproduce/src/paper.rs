@@ -143,14 +143,14 @@ impl Designs {
     fn controller(&self, contender: Contender) -> ControllerParameters {
         match contender {
             Contender::Proposed | Contender::ToldTheFault | Contender::NoFtc => {
-                self.proposed.controller.clone()
+                self.proposed.parameters()
             }
             Contender::PrintedCompensation => ControllerParameters {
                 compensation: Compensation::Additive,
-                ..self.proposed.controller.clone()
+                ..self.proposed.parameters()
             },
-            Contender::AdditiveReference => self.additive.controller.clone(),
-            Contender::AdditiveSliding => self.sliding.controller.clone(),
+            Contender::AdditiveReference => self.additive.parameters(),
+            Contender::AdditiveSliding => self.sliding.parameters(),
         }
     }
 
@@ -158,10 +158,11 @@ impl Designs {
     fn compete(&self, reference: &[Waveform]) -> Vec<(Contender, Trajectory)> {
         let mut scenario = self.proposed.scenario.clone();
         scenario.reference = reference.to_vec();
-        let plant = PlantSimulator::new(self.proposed.controller.plant.clone(), scenario);
+        let plant = PlantSimulator::new(self.proposed.plant.clone(), scenario);
         Contender::ALL
             .map(|contender| {
-                let controller = Controller::new(self.controller(contender));
+                let controller = Controller::new(self.controller(contender))
+                    .expect("a finished design has matching sizes");
                 let trajectory = simulate(&plant, &controller, contender.variant());
                 (contender, trajectory)
             })

@@ -5,10 +5,11 @@ use super::{ObserverCertificate, ObserverDesign};
 use crate::augmented::scaled;
 use crate::certificate::{LyapunovMatrix, observer_growth};
 use crate::lmi::{Affine, Inequality, Problem, Variable};
+use crate::matrices::plain;
 use crate::units::power_of_two;
 use crate::verdict::{BlockKind, BlockName, DesignError, SolverFailure, infeasible};
 use crate::{Advice, DwellTime, Lyapunov, ObserverChoice, ObserverSpec};
-use ftc_control::parameters::{Gain, Observer, ObserverKind};
+use ftc_control::parameters::{Observer, ObserverKind};
 use ftc_plant::scaling::Scaling;
 use ftc_plant::{Dimensions, SwitchedPlant, spectral_radius};
 use nalgebra::DMatrix;
@@ -276,10 +277,10 @@ fn attempt(
         observer: Observer {
             kind,
             note,
-            gains: gains.iter().map(|gain| Gain(physical(gain))).collect(),
+            gains: gains.iter().map(|gain| plain(&physical(gain))).collect(),
             decoupling: h
                 .iter()
-                .map(|row| row.iter().cloned().map(Gain).collect())
+                .map(|row| row.iter().map(plain).collect())
                 .collect(),
         },
         dwell: None,

@@ -23,8 +23,8 @@ pub fn mode_name(modes: &[Mode], index: usize) -> String {
 /// Names and values, in the order of the signal path.
 pub fn facts(design: &Design) -> Vec<(String, String)> {
     let controller = &design.controller;
-    let dims = controller.plant.dimensions();
-    let te = controller.plant.sample_time;
+    let dims = design.plant.dimensions();
+    let te = design.plant.sample_time;
     let estimator = &controller.estimator;
     let feedback = &controller.feedback;
     let mut facts = vec![
@@ -32,7 +32,7 @@ pub fn facts(design: &Design) -> Vec<(String, String)> {
             "Plant",
             format!(
                 "{} of {}, {}, {}, {}",
-                count(controller.plant.modes.len(), "mode"),
+                count(design.plant.modes.len(), "mode"),
                 count(dims.states, "state"),
                 count(dims.inputs, "input"),
                 count(dims.outputs, "output"),
