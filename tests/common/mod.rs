@@ -171,6 +171,8 @@ pub fn controller_design(channel: Channel, noise: f64) -> ControllerDesign {
             note: None,
             gains: observer_gains,
             decoupling: vec![vec![plain(&decoupling); 2]; 2],
+            lost: Vec::new(),
+            minimum_dwell: 0,
         },
         estimator: Estimator {
             method: EstimatorMethod::Reference,

@@ -179,6 +179,22 @@ fn observer(observer: &Observer, sizes: Sizes) -> Checked {
             shape(format!("observer.decoupling[{from}][{to}]"), matrix, gain)?;
         }
     }
+    for (index, set) in observer.lost.iter().enumerate() {
+        let field = format!("observer.lost[{index}]");
+        range(
+            set.sensors.iter().all(|&sensor| sensor < sizes.outputs),
+            format!("{field}.sensors"),
+            "must name outputs of the plant",
+        )?;
+        length(
+            format!("{field}.correction"),
+            set.correction.len(),
+            sizes.modes,
+        )?;
+        for matrix in &set.correction {
+            shape(format!("{field}.correction"), matrix, gain)?;
+        }
+    }
     Ok(())
 }
 

@@ -16,10 +16,10 @@ mod failure;
 mod progress;
 
 use clap::{Parser, Subcommand, ValueEnum};
-use design_file::schema::DesignFile;
+use design_file::Loaded;
 use failure::Failure;
 use ftc_design::Design;
-use ftc_design::assembly::Request;
+use ftc_design::warnings::LoggedMovement;
 use package::output::Staging;
 use progress::Progress;
 use report::{summary, warnings};
@@ -164,7 +164,7 @@ fn run(arguments: &Arguments) -> Result<String, Failure> {
             json,
             as_printed: true,
         } => {
-            let (_, request) = read(design, &progress)?;
+            let request = read(design, &progress)?.request;
             progress.tell("looking for a margin");
             as_printed::report(design, request, *json)
         }
@@ -302,13 +302,9 @@ fn write(out: &Path, files: &[(String, Vec<u8>)]) -> Result<(), Failure> {
 }
 
 /// Reads a design file.
-fn read(path: &Path, progress: &Progress) -> Result<(DesignFile, Request), Failure> {
+fn read(path: &Path, progress: &Progress) -> Result<Loaded, Failure> {
     progress.tell("reading the design file");
-    let file = design_file::read(path).map_err(Failure::Input)?;
-    let folder = path.parent().unwrap_or(Path::new(""));
-    design_file::assemble::request(&file, folder)
-        .map_err(|what| Failure::Input(format!("{}: {what}", path.display())))
-        .map(|request| (file, request))
+    design_file::read(path).map_err(|error| Failure::Input(error.to_string()))
 }
 
 /// A design, and what its user should know of it: one sentence each.
@@ -319,9 +315,9 @@ struct Made {
 
 /// Reads a design file and makes the design.
 fn solve(path: &Path, progress: &Progress) -> Result<Made, Failure> {
-    let (file, request) = read(path, progress)?;
+    let Loaded { file, request, .. } = read(path, progress)?;
     let asked = request.control.clone();
-    let logged = warnings::Logged::of(&request.estimator.database);
+    let logged = LoggedMovement::of(&request.estimator.database);
     progress.tell("solving for gains and certifying them");
     let design = ftc_design::assembly::assemble(request)
         .map_err(|error| Failure::new(path, asked, error))?;

@@ -103,6 +103,8 @@ fn lags(outputs: usize, disturbances: usize, steps: u64) -> Design {
                 note: Some("no disturbance to decouple".into()),
                 gains: vec![diagonal(0.4); 2],
                 decoupling: vec![vec![diagonal(0.0); 2]; 2],
+                lost: Vec::new(),
+                minimum_dwell: 0,
             },
             estimator: Estimator {
                 method: EstimatorMethod::None,
