@@ -78,7 +78,11 @@ pub fn noise_is_unknown(file: &DesignFile) -> bool {
     unknown && estimator.method != Some(schema::EstimatorMethod::None)
 }
 
-fn load(path: &Path) -> Result<String, String> {
+/// The text of a design file.
+///
+/// # Errors
+/// The end of a sentence that begins with the file's name.
+pub fn load(path: &Path) -> Result<String, String> {
     if path.is_dir() {
         return Err("this is a directory: name a design file (TOML) in it".into());
     }
