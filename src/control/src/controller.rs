@@ -211,6 +211,12 @@ impl Controller {
         }
     }
 
+    /// Before a tick: its readings are held ones, since nobody read the sensors anew; that they
+    /// repeat accuses nobody.
+    pub fn hold_readings(&self, state: &mut ControllerState) {
+        state.repetition.hold();
+    }
+
     /// One tick: takes the sample and leaves the command in `state.command`.
     pub fn tick(&self, state: &mut ControllerState, sample: &Sample<'_>) {
         let mode = sample.mode.min(self.modes.len().saturating_sub(1));

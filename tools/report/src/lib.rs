@@ -11,6 +11,7 @@
 //! size in pixels and spend a third of a phone's width on the legend.
 
 mod axis;
+pub mod connection;
 mod decimate;
 mod demo;
 pub mod documentation;

@@ -45,6 +45,7 @@ fn paper(noise: f64) -> Design {
             inputs: signals(2, "u", None),
             outputs: signals(2, "y", None),
             states: signals(2, "x", None),
+            disturbances: Vec::new(),
         },
         plant: common::plant(common::Channel::State),
         controller,
@@ -88,6 +89,7 @@ fn lags(outputs: usize, disturbances: usize, steps: u64) -> Design {
             inputs: signals(outputs, "u", Some("V")),
             outputs: signals(outputs, "y", Some("A")),
             states: signals(outputs, "x", None),
+            disturbances: Vec::new(),
         },
         plant,
         controller: ControllerDesign {
