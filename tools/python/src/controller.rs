@@ -22,7 +22,6 @@ impl Controller {
     /// What the controller says of its parameters.
     pub fn of(design: &ftc_design::Design) -> PyResult<Self> {
         let controller = ftc_control::Controller::new(design.parameters())
-            .expect("a finished design has matching sizes")
             .map_err(|error| PyValueError::new_err(error.to_string()))?;
         Ok(Self {
             state: controller.initial_state(0),
