@@ -152,7 +152,6 @@ fn feedback(feedback: &StateFeedback, sizes: Sizes) -> Checked {
         shape(field("feedforward"), &gains.feedforward, (m, directly))?;
         shape(field("previous_input"), &gains.previous_input, (m, acting))?;
         shape(field("anti_windup"), &gains.anti_windup, (q, m))?;
-        shape(field("integral_inverse"), &gains.integral_inverse, (q, m))?;
         shape(field("output_feedback"), &gains.output_feedback, (m, p))?;
     }
     Ok(())

@@ -74,7 +74,6 @@ fn lags(outputs: usize, disturbances: usize, steps: u64) -> Design {
         feedforward: Matrix::zeros(outputs, 0),
         previous_input: Matrix::zeros(outputs, 0),
         anti_windup: diagonal(0.0),
-        integral_inverse: diagonal(5.0),
         output_feedback: diagonal(-0.1),
     };
     let plant = SwitchedPlant {
@@ -97,7 +96,7 @@ fn lags(outputs: usize, disturbances: usize, steps: u64) -> Design {
                 tracked: (0..outputs).collect(),
                 latency: 0,
                 resonators: vec![],
-                bumpless: false,
+                transfer: None,
                 modes: vec![gains; 2],
             },
             observer: Observer {

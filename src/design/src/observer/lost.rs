@@ -16,6 +16,8 @@ use crate::lyapunov::all_pairs;
 use crate::matrices::dense;
 use crate::verdict::BlockKind;
 use ftc_control::Matrix;
+#[cfg(feature = "solver")]
+use ftc_control::parameters::Observer;
 use ftc_control::parameters::{LostSet, ObserverKind};
 use ftc_plant::SwitchedPlant;
 use nalgebra::DMatrix;
@@ -217,6 +219,13 @@ pub(crate) fn changes(
         }
     }
     found
+}
+
+/// Whether every gain for lost sensors is finite.
+#[cfg(feature = "solver")]
+pub(crate) fn gains_fit(observer: &Observer) -> bool {
+    let gains = observer.lost.iter().flat_map(|set| &set.correction);
+    gains.into_iter().all(Matrix::is_finite)
 }
 
 /// Everything [`verify`] indexes has the size it must have.
