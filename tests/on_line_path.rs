@@ -1,4 +1,4 @@
-//! The on-line path is sacred: no allocation, finite in and finite out, the same bits every time.
+//! The on-line path: no allocation, finite in and finite out, the same bits every time.
 //!
 //! promise: no-allocation
 
@@ -9,29 +9,6 @@ use ftc_control::parameters::Transfer;
 use ftc_control::{Controller, ControllerState};
 use ftc_simulate::{PlantSimulator, Variant, run};
 use proptest::prelude::*;
-use std::alloc::{GlobalAlloc, Layout, System};
-use std::cell::Cell;
-
-/// Counts this thread's allocations.
-struct Counting;
-
-thread_local! {
-    static ALLOCATIONS: Cell<u64> = const { Cell::new(0) };
-}
-
-// SAFETY: every call is handed on to the system allocator unchanged.
-unsafe impl GlobalAlloc for Counting {
-    unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
-        ALLOCATIONS.with(|count| count.set(count.get() + 1));
-        unsafe { System.alloc(layout) }
-    }
-    unsafe fn dealloc(&self, pointer: *mut u8, layout: Layout) {
-        unsafe { System.dealloc(pointer, layout) }
-    }
-}
-
-#[global_allocator]
-static ALLOCATOR: Counting = Counting;
 
 fn tick(
     controller: &Controller,
@@ -64,25 +41,22 @@ fn outputs(state: &ControllerState) -> Vec<f64> {
 fn a_tick_allocates_nothing() {
     let controller = Controller::new(controller(Channel::State, 0.005)).unwrap();
     let mut state = controller.initial_state(0);
-    let before = ALLOCATIONS.with(Cell::get);
-    for k in 0..2000_u64 {
-        let lost = if k % 97 == 0 { f64::NAN } else { 0.01 };
-        tick(
-            &controller,
-            &mut state,
-            k,
-            (k / 300) as usize % 2,
-            &[lost, 0.02],
-            &[0.3, -0.1],
-        );
-    }
-    assert_eq!(ALLOCATIONS.with(Cell::get) - before, 0);
-    drop(Box::new(1));
-    assert_ne!(
-        ALLOCATIONS.with(Cell::get),
-        before,
-        "the counter must count"
-    );
+    let counted = allocation_counter::measure(|| {
+        for k in 0..2000_u64 {
+            let lost = if k % 97 == 0 { f64::NAN } else { 0.01 };
+            tick(
+                &controller,
+                &mut state,
+                k,
+                (k / 300) as usize % 2,
+                &[lost, 0.02],
+                &[0.3, -0.1],
+            );
+        }
+    });
+    assert_eq!(counted.count_total, 0);
+    let counted = allocation_counter::measure(|| drop(std::hint::black_box(Box::new(1))));
+    assert_eq!(counted.count_total, 1, "the counter must count");
 }
 
 #[test]

@@ -362,10 +362,10 @@ fn newest(folder: &Path, library: impl Fn(&str) -> String) -> Option<SystemTime>
         .max()
 }
 
-/// What cargo calls the shared library on this platform.
+/// What cargo calls the shared library on this platform: the crate is the binary's name and `_fmu`.
 fn host_library(binary: &str) -> String {
     format!(
-        "{}{binary}{}",
+        "{}{binary}_fmu{}",
         std::env::consts::DLL_PREFIX,
         std::env::consts::DLL_SUFFIX
     )

@@ -68,15 +68,15 @@ fn changes(number: &Number) -> Vec<Value> {
 fn harmless(path: &str, design: &Design, original: &Design) -> bool {
     let begins = |prefix: &str| path.starts_with(prefix);
     // The plant and what is proved of it: the proof went through for the changed numbers.
-    let proved_again = begins("/synthesis/") || begins("/controller/plant/modes/");
+    let proved_again = begins("/synthesis/") || begins("/plant/modes/");
     // Named as not proved by `verify`, and without a part in the linear loop.
     let named = begins("/controller/estimator/");
     // What the plant FMU plays, and what signals are called: no part of the controller.
-    let elsewhere = begins("/scenario/") || begins("/truth/") || begins("/signals/");
+    let elsewhere = begins("/scenario/") || begins("/true_plant/") || begins("/signals/");
     let same_loop = design.controller.feedback == original.controller.feedback
         && design.controller.observer == original.controller.observer
         && design.controller.input_limits == original.controller.input_limits;
-    (proved_again || named || elsewhere || begins("/controller/plant/sample_time")) && same_loop
+    (proved_again || named || elsewhere || begins("/plant/sample_time")) && same_loop
 }
 
 /// Whether everything the proofs and relations read is that of the original.

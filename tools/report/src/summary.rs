@@ -1,9 +1,9 @@
 //! The design report, for a person and for a program.
 
 use crate::running_loop;
-use crate::text::count;
+use crate::text::{count, number};
 use crate::warnings;
-use ftc_control::parameters::{EstimatorMethod, ObserverKind};
+use ftc_control::parameters::{Compensation, EstimatorMethod, ObserverKind};
 use ftc_design::augmented::assumes_input_disturbance;
 use ftc_design::{ControlSpec, Design, DesignError, ObserverDesign, Signal, StateFeedback};
 use serde_json::{Value, json};
@@ -40,6 +40,8 @@ pub fn sections(design: &Design) -> Vec<Section> {
         sections.push(("Lost sensors", running_loop::lost(design, synthesis)));
     }
     sections.push(("Fault estimator", estimator(design)));
+    let compensation = compensation(design.controller.compensation);
+    sections.push(("Compensation", vec![line("method", compensation)]));
     if let Some(synthesis) = &design.synthesis {
         sections.push(("Certificate", certificate(&synthesis.state_feedback)));
     }
@@ -163,7 +165,11 @@ fn estimator(design: &Design) -> Vec<(String, String)> {
     let outputs = &design.signals.outputs;
     lines.push(line(
         "response length",
-        count(estimator.response_length, "sample"),
+        format!(
+            "{} ({} s)",
+            count(estimator.response_length, "sample"),
+            number(estimator.response_length as f64 * design.plant.sample_time)
+        ),
     ));
     for (index, predictor) in estimator.predictors.iter().enumerate() {
         lines.push(line(
@@ -200,6 +206,16 @@ fn estimator(design: &Design) -> Vec<(String, String)> {
         ));
     }
     lines
+}
+
+fn compensation(compensation: Compensation) -> &'static str {
+    match compensation {
+        Compensation::VirtualSensor => {
+            "virtual sensor: observer and integrator see the corrected measurement"
+        }
+        Compensation::Additive => "additive control, as printed in the paper",
+        Compensation::None => "none: the estimate is only reported",
+    }
 }
 
 fn observer_decay(observer: &ObserverDesign) -> Vec<(String, String)> {
