@@ -4,6 +4,8 @@ pub mod assemble;
 pub mod check;
 pub mod defaults;
 pub mod healthy_log;
+pub mod notes;
+mod plant;
 pub mod schema;
 pub mod sentence;
 mod signal;
@@ -11,7 +13,6 @@ pub mod suggest;
 pub mod values;
 
 use schema::DesignFile;
-use std::fs::File;
 use std::io::Read;
 use std::path::Path;
 
@@ -29,21 +30,16 @@ pub fn read(path: &Path) -> Result<DesignFile, String> {
 }
 
 fn load(path: &Path) -> Result<String, String> {
-    if path.is_dir() {
-        return Err("this is a directory: name a design file (TOML) in it".into());
-    }
-    let file = File::open(path).map_err(|error| {
-        format!("cannot be opened ({error}): check the path and its permissions")
-    })?;
     let mut bytes = Vec::new();
-    file.take(LARGEST_FILE + 1)
+    ftc_tables::open_regular(path, LARGEST_FILE)
+        .map_err(|what| match path.is_dir() {
+            true => "this is a directory: name a design file (TOML) in it".into(),
+            false => what,
+        })?
         .read_to_end(&mut bytes)
         .map_err(|error| format!("cannot be read ({error}): check the path"))?;
     if bytes.len() as u64 > LARGEST_FILE {
-        return Err(format!(
-            "this is larger than {} MB and no design file: name a TOML file, and put long tables into CSV files",
-            LARGEST_FILE >> 20
-        ));
+        return Err(format!("is larger than {} MB: put long tables into CSV files", LARGEST_FILE >> 20));
     }
     let text = String::from_utf8(bytes).map_err(|error| {
         format!(

@@ -5,7 +5,7 @@
 //! [`crate::defaults`]; what a value must satisfy, in [`crate::check`].
 
 use crate::signal::{Event, Signal};
-use crate::values::{NameOrList, NumberOrList};
+use crate::values::{Matrix, NameOrList, NumberOrList};
 use ftc::plant::rectifier::Rectifier;
 use serde::Deserialize;
 
@@ -17,6 +17,8 @@ pub struct DesignFile {
     pub name: String,
     /// `Te` in seconds.
     pub sample_time: f64,
+    /// Whether `A`, `B`, `E` describe `dx/dt` rather than the next sample.
+    pub continuous: Option<bool>,
     /// The modes of the plant, `[[mode]]`; none where the plant has a model with a name.
     #[serde(rename = "mode", default)]
     pub modes: Vec<Mode>,
@@ -52,27 +54,35 @@ pub enum PlantModel {
     Rectifier(Rectifier),
 }
 
-/// One `[[mode]]`; matrices are lists of rows.
+/// One `[[mode]]`; a matrix is a list of rows, or the name of a variable in `file`.
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Mode {
     /// What the user calls it.
     pub name: Option<String>,
+    /// A MATLAB (`.mat`) or NumPy (`.npz`) file with the matrices that are not given as rows.
+    pub file: Option<String>,
+    /// The structure in `file` whose fields the matrices are.
+    #[serde(rename = "struct")]
+    pub structure: Option<String>,
     /// State matrix (n x n).
     #[serde(rename = "A")]
-    pub a: Vec<Vec<f64>>,
+    pub a: Option<Matrix>,
     /// Input matrix (n x m).
     #[serde(rename = "B")]
-    pub b: Vec<Vec<f64>>,
+    pub b: Option<Matrix>,
     /// Output matrix (p x n).
     #[serde(rename = "C")]
-    pub c: Vec<Vec<f64>>,
+    pub c: Option<Matrix>,
+    /// Direct feedthrough from input to output (p x m).
+    #[serde(rename = "D")]
+    pub d: Option<Matrix>,
     /// Disturbance to state (n x s).
     #[serde(rename = "E")]
-    pub e: Option<Vec<Vec<f64>>>,
+    pub e: Option<Matrix>,
     /// Disturbance to output (p x s).
     #[serde(rename = "F")]
-    pub f: Option<Vec<Vec<f64>>>,
+    pub f: Option<Matrix>,
     /// The steady state around which the mode is linear.
     pub operating_point: Option<OperatingPoint>,
 }
@@ -211,6 +221,8 @@ pub struct Estimator {
     pub response_length: Option<i64>,
     /// `commission`, `model`, the name of a CSV file, or a list of one per mode.
     pub database: Option<NameOrList>,
+    /// The time column of the logs, where it has no usual name.
+    pub time: Option<String>,
     /// Residual that flags a fault, per sensor (number or p).
     pub threshold: Option<NumberOrList>,
     /// The same in standard deviations of the healthy residual.

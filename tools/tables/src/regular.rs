@@ -27,8 +27,7 @@ pub fn open_regular(path: &Path, most: u64) -> Result<Take<File>, String> {
     }
     if opened.len() > most {
         return Err(format!(
-            "has {} MB, more than the {} MB that are read: shorten it",
-            opened.len() >> 20,
+            "is larger than {} MB: shorten it, or name another file",
             most >> 20
         ));
     }
