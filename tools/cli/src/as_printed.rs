@@ -1,9 +1,9 @@
 //! `design --as-printed`: the paper's Theorems 1 and 2 as they stand, put to the margin problem.
 
 use crate::failure::Failure;
-use ftc::design::DesignError;
-use ftc::design::as_printed::{PrintedVerdict, theorem_1, theorem_2};
-use ftc::design::assembly::Request;
+use ftc_design::DesignError;
+use ftc_design::as_printed::{PrintedVerdict, theorem_1, theorem_2};
+use ftc_design::assembly::Request;
 use report::summary;
 use serde_json::json;
 use std::fmt::Write;

@@ -1,6 +1,6 @@
 //! Why a command ends without success, and with which exit code.
 
-use ftc::design::{ControlSpec, DesignError};
+use ftc_design::{ControlSpec, DesignError};
 use report::summary;
 use std::fmt;
 use std::path::Path;

@@ -5,22 +5,19 @@
 use crate::check;
 use crate::defaults;
 use crate::healthy_log::Logs;
+use crate::notes::Notes;
+use crate::plant;
 use crate::schema::{
     self, CompensationMethod, DesignFile, EstimatorMethod, LyapunovKind, ObjectiveKind,
     ObserverKind, PlantModel, SignalInfo,
 };
-use crate::notes::Notes;
-use crate::plant;
 use crate::signal::{Signal as SignalOverTime, Tables};
 use crate::values::{NameOrList, NumberOrList};
-use ftc::control::parameters;
-use ftc::design::assembly::{DatabaseSource, EstimatorSpec, KnownDisturbance, Request, Threshold};
-use ftc::design::{ControlSpec, Lyapunov, Objective, ObserverSpec, Signal, Signals};
-use ftc::plant::{Dimensions, Mode, OperatingPoint, SwitchedPlant};
-use ftc::rows;
-use ftc::simulate::scenario::{ModeInterval, Waveform};
-use ftc::simulate::{Scenario, Truth};
-use nalgebra::DMatrix;
+use ftc_control::parameters;
+use ftc_design::assembly::{DatabaseSource, EstimatorSpec, KnownDisturbance, Request, Threshold};
+use ftc_design::{ControlSpec, Lyapunov, Objective, ObserverSpec, Signal, Signals};
+use ftc_plant::scenario::{ModeInterval, Waveform};
+use ftc_plant::{Dimensions, OperatingPoint, Scenario, SwitchedPlant, Truth};
 use std::path::Path;
 
 /// The largest number of states, inputs, outputs, disturbances or modes.
@@ -205,12 +202,16 @@ fn signal(info: &SignalInfo, default_name: String, operating: f64) -> Result<Sig
     let range = min.zip(max).map(|(min, max)| (max - min) / 2.0);
     let operating = (operating > 0.0).then_some(operating);
     let name = info.name.clone().unwrap_or(default_name);
-    if name.trim().is_empty() || name.chars().any(char::is_control) {
+    if name.trim().is_empty() || !check::printable(&name) {
         return Err("name is empty or not printable: give a name, or leave the key out".into());
+    }
+    let unit = info.unit.clone().filter(|unit| !unit.trim().is_empty());
+    if unit.as_deref().is_some_and(|unit| !check::printable(unit)) {
+        return Err("unit has a character that is not printable: give the unit's letters".into());
     }
     Ok(Signal {
         name,
-        unit: info.unit.clone().filter(|unit| !unit.trim().is_empty()),
+        unit,
         nominal: info.nominal.or(operating).or(range).unwrap_or(1.0),
         min,
         max,
@@ -336,7 +337,7 @@ fn weight(
 }
 
 fn observer(given: &schema::Observer, control: &ControlSpec) -> Result<ObserverSpec, String> {
-    use ftc::design::ObserverChoice as Kind;
+    use ftc_design::ObserverChoice as Kind;
     let decay = given.decay.unwrap_or(control.decay);
     at("observer.decay", check::decay(decay))?;
     Ok(ObserverSpec {
@@ -406,7 +407,7 @@ fn estimator(
         None => None,
         Some(length) => Some(at(
             "estimator.response_length",
-            check::count(length, 1, ftc::design::commissioning::LONGEST_RESPONSE),
+            check::count(length, 1, ftc_design::commissioning::LONGEST_RESPONSE),
         )?),
     };
     let debounce = match given.debounce {
@@ -600,7 +601,7 @@ impl Play<'_> {
         given.iter().enumerate().map(waveform).collect()
     }
 
-    fn events(&self) -> Result<Vec<ftc::simulate::scenario::FaultEvent>, String> {
+    fn events(&self) -> Result<Vec<ftc_plant::scenario::FaultEvent>, String> {
         let events = self.scenario.events.iter().flatten().enumerate();
         events
             .map(|(index, event)| {

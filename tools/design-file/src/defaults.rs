@@ -27,7 +27,7 @@
 use crate::schema::{
     CompensationMethod, EstimatorMethod, LyapunovKind, ObjectiveKind, ObserverKind,
 };
-use ftc::design::assembly::DatabaseSource;
+use ftc_design::assembly::DatabaseSource;
 
 /// `disturbance.harmonics`
 pub const HARMONICS: usize = 1;

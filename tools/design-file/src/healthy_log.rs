@@ -5,9 +5,9 @@
 //! (from 1) are optional, every other column is ignored.
 
 use crate::{check, notes::Notes, sentence, suggest, values::NameOrList};
-use ftc::design::commissioning::Database;
-use ftc::design::{Signal, Signals};
-use ftc::plant::{Mode, SwitchedPlant};
+use ftc_design::commissioning::Database;
+use ftc_design::{Signal, Signals};
+use ftc_plant::{Mode, SwitchedPlant};
 use ftc_tables::{Clock, Place, Row as Cells, Table, TimeColumn, find_time_column};
 use nalgebra::DMatrix;
 use std::path::Path;

@@ -39,7 +39,10 @@ fn load(path: &Path) -> Result<String, String> {
         .read_to_end(&mut bytes)
         .map_err(|error| format!("cannot be read ({error}): check the path"))?;
     if bytes.len() as u64 > LARGEST_FILE {
-        return Err(format!("is larger than {} MB: put long tables into CSV files", LARGEST_FILE >> 20));
+        return Err(format!(
+            "is larger than {} MB: put long tables into CSV files",
+            LARGEST_FILE >> 20
+        ));
     }
     let text = String::from_utf8(bytes).map_err(|error| {
         format!(

@@ -209,7 +209,9 @@ impl<'a> Source<'a> {
     fn required(&self, name: &str) -> Result<DMatrix<f64>, String> {
         match (self.optional(name)?, &self.file) {
             (Some(matrix), _) => Ok(matrix),
-            (None, None) => Err(format!("{name} is missing: add it, or a file that holds it")),
+            (None, None) => Err(format!(
+                "{name} is missing: add it, or a file that holds it"
+            )),
             (None, Some((file, found))) => {
                 let names: Vec<&str> = found.names().collect();
                 Err(format!(
@@ -259,7 +261,10 @@ impl<'a> Source<'a> {
     /// small, in the structure that is named, at the top, or in the only structure with `A`, `B`, `C`.
     fn usual(&self, name: &str, found: &Matrices) -> Option<String> {
         let spelt = [name.to_string(), name.to_lowercase()];
-        let direct = spelt.iter().map(|name| self.path(name)).find(|path| found.holds(path));
+        let direct = spelt
+            .iter()
+            .map(|name| self.path(name))
+            .find(|path| found.holds(path));
         if direct.is_some() || self.given.structure.is_some() {
             return direct;
         }
@@ -302,9 +307,23 @@ fn mode(source: &Source, number: usize, disturbances: usize) -> Result<Given, St
         None => OperatingPoint::zero(n, b.ncols(), p),
     };
     let feedthrough = source.optional("D")?;
+    if source
+        .given
+        .name
+        .as_deref()
+        .is_some_and(|name| !check::printable(name))
+    {
+        return Err(
+            "name has a character that is not printable: give the mode another name".into(),
+        );
+    }
     Ok(Given {
         mode: Mode {
-            name: source.given.name.clone().unwrap_or(format!("mode {number}")),
+            name: source
+                .given
+                .name
+                .clone()
+                .unwrap_or(format!("mode {number}")),
             e: channel("E", n)?,
             f: channel("F", p)?,
             a,

@@ -6,7 +6,7 @@
 
 use crate::signal::{Event, Signal};
 use crate::values::{Matrix, NameOrList, NumberOrList};
-use ftc::plant::rectifier::Rectifier;
+use ftc_plant::rectifier::Rectifier;
 use serde::Deserialize;
 
 /// A whole design file.

@@ -1,7 +1,7 @@
 //! Signals over time, and faults of sensors, as the user writes them.
 
-use ftc::simulate::scenario::{FaultEvent, FaultKind, Waveform};
 use crate::notes::Notes;
+use ftc_plant::scenario::{FaultEvent, FaultKind, Waveform};
 use ftc_tables::{Clock, Interpolation, Table, find_time_column, resample};
 use serde::de::value::MapAccessDeserializer;
 use serde::de::{Deserialize, Deserializer, Error, MapAccess, Visitor};
@@ -391,9 +391,17 @@ impl Tables<'_> {
         };
         clock.check_ascending()?;
         if clock.times().last().is_some_and(|&last| last < 0.0) {
-            return Err("ends before time 0: let its times count from the start of the scenario".into());
+            return Err(
+                "ends before time 0: let its times count from the start of the scenario".into(),
+            );
         }
         let (times, step) = (clock.times(), self.sample_time);
-        Ok(resample(times, &values, step, interpolation, self.most_samples))
+        Ok(resample(
+            times,
+            &values,
+            step,
+            interpolation,
+            self.most_samples,
+        ))
     }
 }

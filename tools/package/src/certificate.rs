@@ -1,6 +1,6 @@
 //! `resources/certificate.json`: what an FMU's design promises, and what proves it.
 
-use ftc::design::{ControlCertificate, Design, DwellTime, Lyapunov, ObserverCertificate};
+use ftc_design::{ControlCertificate, Design, DwellTime, Lyapunov, ObserverCertificate};
 use serde::{Deserialize, Serialize};
 
 /// Where it stands in an FMU.

@@ -4,7 +4,7 @@ use crate::Error;
 use crate::certificate::{self, Certificate, Promise};
 use crate::export::{KINDS, Kind};
 use crate::platform::PLATFORMS;
-use ftc::design::Design;
+use ftc_design::Design;
 use roxmltree::Document;
 use serde_json::{Value, json};
 use std::collections::BTreeMap;

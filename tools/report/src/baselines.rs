@@ -1,10 +1,10 @@
 //! `simulate --baselines`: what the design is compared with, in the same scenario.
 
-use ftc::control::Controller;
-use ftc::design::{Design, DesignError};
-use ftc::simulate::baselines::predictive::{Predictive, PredictiveSpec};
-use ftc::simulate::baselines::{additive, deadbeat_bound, response_delay};
-use ftc::simulate::{PlantSimulator, Trajectory, Variant, run, run_with};
+use ftc_control::Controller;
+use ftc_design::{Design, DesignError};
+use ftc_simulate::baselines::predictive::{Predictive, PredictiveSpec};
+use ftc_simulate::baselines::{additive, deadbeat_bound, response_delay};
+use ftc_simulate::{PlantSimulator, Trajectory, Variant, run, run_with};
 
 /// Samples the predictive controller looks ahead.
 const HORIZON: usize = 20;

@@ -4,8 +4,8 @@
 use crate::Scene;
 use crate::page::{Block, Page, Section};
 use crate::{simulate, summary};
-use ftc::design::Design;
-use ftc::simulate::{Trajectory, Variant};
+use ftc_design::Design;
+use ftc_simulate::{Trajectory, Variant};
 
 /// The most samples that are simulated for the figures; an export is to remain quick.
 const MOST_SAMPLES: u64 = 20_000;

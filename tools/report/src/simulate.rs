@@ -2,10 +2,10 @@
 
 use crate::baselines;
 use crate::warnings;
-use ftc::control::Controller;
-use ftc::design::Design;
-use ftc::simulate::closed_loop::{Merits, Record};
-use ftc::simulate::{PlantSimulator, Trajectory, Variant, run};
+use ftc_control::Controller;
+use ftc_design::Design;
+use ftc_simulate::closed_loop::{Merits, Record};
+use ftc_simulate::{PlantSimulator, Trajectory, Variant, run};
 use serde_json::{Map, Value, json};
 use std::fmt::Write;
 

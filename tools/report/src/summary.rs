@@ -2,8 +2,8 @@
 
 use crate::text::count;
 use crate::warnings;
-use ftc::control::parameters::{EstimatorMethod, ObserverKind};
-use ftc::design::{ControlSpec, Design, DesignError, ObserverDesign, Signal, StateFeedback};
+use ftc_control::parameters::{EstimatorMethod, ObserverKind};
+use ftc_design::{ControlSpec, Design, DesignError, ObserverDesign, Signal, StateFeedback};
 use serde_json::{Value, json};
 use std::fmt::Write;
 

@@ -3,15 +3,16 @@
 use super::figure::{Figure, Mark, Series};
 use super::page::{Column, KeyNumber, Page, Row, Section, Table};
 use super::{demo, svg};
-use ftc::control::Controller;
-use ftc::control::parameters::{
+use ftc_control::Controller;
+use ftc_control::parameters::{
     Compensation, ControllerParameters, Estimator, EstimatorMethod, FeedbackGains, Gain, Limits,
     Observer, ObserverKind, StateFeedback,
 };
-use ftc::design::{Design, FORMAT, Signal, Signals};
-use ftc::plant::{Mode, OperatingPoint, SwitchedPlant};
-use ftc::simulate::scenario::{FaultEvent, FaultKind, ModeInterval, Waveform};
-use ftc::simulate::{PlantSimulator, Scenario, Trajectory, Truth, Variant, run};
+use ftc_design::{Design, FORMAT, Signal, Signals};
+use ftc_plant::scenario::{FaultEvent, FaultKind, ModeInterval, Waveform};
+use ftc_plant::{Mode, OperatingPoint, SwitchedPlant};
+use ftc_plant::{Scenario, Truth};
+use ftc_simulate::{PlantSimulator, Trajectory, Variant, run};
 use nalgebra::DMatrix;
 use proptest::prelude::*;
 use std::path::PathBuf;

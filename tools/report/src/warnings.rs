@@ -7,15 +7,16 @@ use design_file::healthy_log::file_of;
 use design_file::schema::{DesignFile, EstimatorMethod as Asked};
 use design_file::sentence::shorten;
 use design_file::values::NameOrList;
-use ftc::control::estimator::{InputHistory, leverage};
-use ftc::control::parameters::{Estimator, EstimatorMethod, Predictor};
-use ftc::design::Design;
-use ftc::design::assembly::DatabaseSource;
-use ftc::design::commissioning::{Database, model_predictor};
-use ftc::plant::Mode;
-use ftc::simulate::closed_loop::Record;
-use ftc::simulate::scenario::first_tick;
-use ftc::simulate::{Trajectory, Truth, Variant};
+use ftc_control::estimator::{InputHistory, leverage};
+use ftc_control::parameters::{Estimator, EstimatorMethod, Predictor};
+use ftc_design::Design;
+use ftc_design::assembly::DatabaseSource;
+use ftc_design::commissioning::{Database, model_predictor};
+use ftc_plant::Mode;
+use ftc_plant::Truth;
+use ftc_plant::scenario::first_tick;
+use ftc_simulate::closed_loop::Record;
+use ftc_simulate::{Trajectory, Variant};
 use nalgebra::{DMatrix, DVector};
 use std::fmt::Write;
 
@@ -49,7 +50,7 @@ fn movements(stretches: &[Database]) -> Vec<f64> {
         let values: Vec<f64> = columns
             .flat_map(|column| column.iter().copied().collect::<Vec<_>>())
             .collect();
-        ftc::simulate::metrics::variance(&values).sqrt()
+        ftc_simulate::metrics::variance(&values).sqrt()
     };
     (0..outputs).map(deviation).collect()
 }

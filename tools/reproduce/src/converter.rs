@@ -9,11 +9,11 @@ mod page;
 
 use super::experiment::{self, OutputMerits, design, merits};
 use super::{Findings, Progress};
-use ftc::control::Controller;
-use ftc::design::Design;
-use ftc::simulate::baselines::predictive::{Predictive, PredictiveSpec};
-use ftc::simulate::scenario::{FaultEvent, FaultKind};
-use ftc::simulate::{PlantSimulator, Trajectory, Variant, run as simulate, run_with};
+use ftc_control::Controller;
+use ftc_design::Design;
+use ftc_plant::scenario::{FaultEvent, FaultKind};
+use ftc_simulate::baselines::predictive::{Predictive, PredictiveSpec};
+use ftc_simulate::{PlantSimulator, Trajectory, Variant, run as simulate, run_with};
 use serde::Serialize;
 use serde_json::json;
 use std::fmt::Write;

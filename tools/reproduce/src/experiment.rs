@@ -1,11 +1,11 @@
 //! What both experiments share: from an example to a design, from runs to numbers and curves.
 
 use design_file::assemble as design_request;
-use ftc::design::assembly::{Request, assemble};
-use ftc::design::{Design, DesignError};
-use ftc::simulate::closed_loop::Record;
-use ftc::simulate::metrics::Merit;
-use ftc::simulate::{Trajectory, Variant};
+use ftc_design::assembly::{Request, assemble};
+use ftc_design::{Design, DesignError};
+use ftc_simulate::closed_loop::Record;
+use ftc_simulate::metrics::Merit;
+use ftc_simulate::{Trajectory, Variant};
 use report::figure::{Dash, Figure, Ink, Mark, Point, Series, Weight};
 use serde::Serialize;
 use std::path::Path;

@@ -97,9 +97,11 @@ fn parse(bytes: Vec<u8>) -> Result<Found, String> {
     if bytes.starts_with(b"\x93NUMPY") {
         return Err("is a single NumPy array: save A, B and C together with numpy.savez".into());
     }
-    Err("is neither a MATLAB file (level 5 or 7.3) nor a NumPy archive (.npz): \
+    Err(
+        "is neither a MATLAB file (level 5 or 7.3) nor a NumPy archive (.npz): \
          save it with save(...) in MATLAB, scipy.io.savemat or numpy.savez"
-        .into())
+            .into(),
+    )
 }
 
 /// The byte order mark that ends the header of a level 5 file.

@@ -269,9 +269,7 @@ fn said_delimiter(head: &[u8]) -> (Option<u8>, usize) {
     };
     match said.as_bytes() {
         [one] if one.is_ascii() => (Some(*one), end.map_or(head.len(), |at| at + 1)),
-        _ if said.eq_ignore_ascii_case("\\t") => {
-            (Some(b'\t'), end.map_or(head.len(), |at| at + 1))
-        }
+        _ if said.eq_ignore_ascii_case("\\t") => (Some(b'\t'), end.map_or(head.len(), |at| at + 1)),
         _ => (None, 0),
     }
 }

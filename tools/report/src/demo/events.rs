@@ -1,7 +1,7 @@
 //! What the records say about faults and alarms.
 
-use ftc::simulate::Trajectory;
-use ftc::simulate::closed_loop::Record;
+use ftc_simulate::Trajectory;
+use ftc_simulate::closed_loop::Record;
 
 /// Whether a sensor is faulty in a record: something is added to it, or it gives no number.
 pub fn is_faulty(record: &Record, sensor: usize) -> bool {

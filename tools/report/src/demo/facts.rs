@@ -1,9 +1,9 @@
 //! What was designed, in words.
 
 use crate::text::{count, number};
-use ftc::control::parameters::{Compensation, EstimatorMethod, Harmonics, ObserverKind};
-use ftc::design::Design;
-use ftc::plant::Mode;
+use ftc_control::parameters::{Compensation, EstimatorMethod, Harmonics, ObserverKind};
+use ftc_design::Design;
+use ftc_plant::Mode;
 
 /// `mode 2`, and its name where the user gave one that says more.
 pub fn mode_name(modes: &[Mode], index: usize) -> String {

@@ -4,10 +4,10 @@ use super::events::{any_fault_intervals, fault_intervals};
 use super::{RANKING, find, name_of, unit_of, variant_name};
 use crate::figure::{Dash, Figure, Ink, Mark, Point, Series, Weight};
 use crate::text::with_unit;
-use ftc::control::parameters::EstimatorMethod;
-use ftc::design::Design;
-use ftc::simulate::closed_loop::Record;
-use ftc::simulate::{Trajectory, Variant};
+use ftc_control::parameters::EstimatorMethod;
+use ftc_design::Design;
+use ftc_simulate::closed_loop::Record;
+use ftc_simulate::{Trajectory, Variant};
 
 const TIME: &str = "time (s)";
 const FAULTY: &str = "fault present";

@@ -10,8 +10,8 @@ use crate::svg;
 use crate::text::{self, count, list, number};
 use events::Alarms;
 pub use figures::Scene;
-use ftc::design::{Design, Signal};
-use ftc::simulate::{Trajectory, Variant};
+use ftc_design::{Design, Signal};
+use ftc_simulate::{Trajectory, Variant};
 
 /// The page of a simulated design as `report.html`, and each of its figures as `KEY.svg`: name and
 /// contents of every file.

@@ -3,9 +3,9 @@
 use super::{RANKING, find, name_of, unit_of, variant_name};
 use crate::page::{Column, Row, Table};
 use crate::text::{aligned, number, significant, with_unit};
-use ftc::control::parameters::EstimatorMethod;
-use ftc::design::Design;
-use ftc::simulate::{Trajectory, Variant};
+use ftc_control::parameters::EstimatorMethod;
+use ftc_design::Design;
+use ftc_simulate::{Trajectory, Variant};
 
 /// MSE and VAF per tracked output and variant, true and measured.
 pub fn merits(design: &Design, trajectories: &[Trajectory]) -> Table {

@@ -2,9 +2,10 @@
 
 use super::{CONTENDERS, FAULTY, HORIZON, INPUT_WEIGHT, REPORTED, Trial, name};
 use crate::experiment::{OutputMerits, curve, figure, reference, series};
-use ftc::design::Design;
-use ftc::simulate::closed_loop::Record;
-use ftc::simulate::{Trajectory, Truth, Variant};
+use ftc_design::Design;
+use ftc_plant::Truth;
+use ftc_simulate::closed_loop::Record;
+use ftc_simulate::{Trajectory, Variant};
 use report::events::fault_intervals;
 use report::figure::{Figure, Ink, Series, Weight};
 use report::page::{Block, Column, KeyNumber, Page, Row, Section, Table};

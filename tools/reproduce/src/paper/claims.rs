@@ -3,7 +3,7 @@
 use super::printed::{self, Absorption, DoubledDisturbance, Latency};
 use super::reachable::{REPORTED, largest_variance};
 use super::{Contender, NOISES, REFERENCES, Record};
-use ftc::design::as_printed::PrintedVerdict;
+use ftc_design::as_printed::PrintedVerdict;
 use report::text::{aligned, number};
 use serde::Serialize;
 

@@ -2,13 +2,13 @@
 
 use super::CHANNELS;
 use crate::experiment;
-use ftc::control::estimator::SlidingWindow;
-use ftc::control::parameters::FeedbackGains;
-use ftc::design::as_printed::{PrintedVerdict, theorem_1, theorem_2};
-use ftc::design::assembly::Request;
-use ftc::design::{ControlSpec, DesignError, Lyapunov, StateFeedback, state_feedback};
-use ftc::plant::scaling::Scaling;
-use ftc::plant::{Mode, SwitchedPlant, spectral_radius};
+use ftc_control::estimator::SlidingWindow;
+use ftc_control::parameters::FeedbackGains;
+use ftc_design::as_printed::{PrintedVerdict, theorem_1, theorem_2};
+use ftc_design::assembly::Request;
+use ftc_design::{ControlSpec, DesignError, Lyapunov, StateFeedback, state_feedback};
+use ftc_plant::scaling::Scaling;
+use ftc_plant::{Mode, SwitchedPlant, spectral_radius};
 use nalgebra::DMatrix;
 use serde::Serialize;
 

@@ -1,8 +1,8 @@
 //! Which references reach the paper's MSE and VAF, which cannot, and why.
 
 use super::{Contender, OutputMerits};
-use ftc::simulate::Trajectory;
-use ftc::simulate::metrics::{Merit, merit, variance};
+use ftc_simulate::Trajectory;
+use ftc_simulate::metrics::{Merit, merit, variance};
 use serde::Serialize;
 
 /// The figures the paper reports for its proposed controller, without its reference.

@@ -79,6 +79,8 @@ fn numbers<R: Read>(file: NpyFile<R>) -> Result<Vec<f64>, String> {
         (TypeChar::Uint, 2) => all(file, |value: u16| f64::from(value)),
         (TypeChar::Uint, 1) => all(file, |value: u8| f64::from(value)),
         (TypeChar::Bool, _) => all(file, |value: bool| f64::from(u8::from(value))),
-        _ => Err(format!("has entries of type {kind}: save real numbers, as float64")),
+        _ => Err(format!(
+            "has entries of type {kind}: save real numbers, as float64"
+        )),
     }
 }

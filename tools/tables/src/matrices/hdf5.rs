@@ -17,7 +17,12 @@ pub(super) fn read(bytes: Vec<u8>) -> Result<Found, String> {
     Ok(found)
 }
 
-fn add(found: &mut Found, prefix: &str, group: &Group, depth: usize) -> Result<(), hdf5_pure::Error> {
+fn add(
+    found: &mut Found,
+    prefix: &str,
+    group: &Group,
+    depth: usize,
+) -> Result<(), hdf5_pure::Error> {
     for name in group.datasets()? {
         let matrix = group
             .dataset(&name)
@@ -36,7 +41,9 @@ fn add(found: &mut Found, prefix: &str, group: &Group, depth: usize) -> Result<(
 
 fn dense(dataset: &Dataset) -> Result<DMatrix<f64>, String> {
     let blame = |error: hdf5_pure::Error| {
-        format!("is no real matrix ({error}): save it with full(...), as double, not in a cell or an object")
+        format!(
+            "is no real matrix ({error}): save it with full(...), as double, not in a cell or an object"
+        )
     };
     let attributes = dataset.attrs().unwrap_or_default();
     if attributes.contains_key("MATLAB_empty") {

@@ -28,7 +28,8 @@ fn add(found: &mut Found, name: &str, variable: &MatVariable, depth: usize) {
             }
         }
         _ => {
-            let what = "is no real matrix: save it with full(...), as double, not in a cell or an object";
+            let what =
+                "is no real matrix: save it with full(...), as double, not in a cell or an object";
             found.insert(name.to_string(), Err(what.into()));
         }
     }
@@ -59,7 +60,9 @@ fn entries(variable: &MatVariable) -> Result<Vec<f64>, String> {
         Some(MatlabType::I32(_)) => all(variable.to_vec_i32(), f64::from),
         Some(MatlabType::U64(_)) => all(variable.to_vec_u64(), |value| value as f64),
         Some(MatlabType::I64(_)) => all(variable.to_vec_i64(), |value| value as f64),
-        Some(MatlabType::BOOL(_)) => all(variable.to_vec_bool(), |value| f64::from(u8::from(value))),
+        Some(MatlabType::BOOL(_)) => {
+            all(variable.to_vec_bool(), |value| f64::from(u8::from(value)))
+        }
         _ => None,
     };
     values.ok_or_else(|| "is a text, not a matrix: name another variable".into())
