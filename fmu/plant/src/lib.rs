@@ -99,7 +99,7 @@ impl PlantFmu {
         values.set(spans.reference, &state.reference);
         values.set(spans.fault, &state.fault);
         values.set(spans.disturbance, &state.disturbance);
-        let number = [(state.mode + 1) as f64];
+        let number = [(state.told + 1) as f64];
         values.set(spans.mode, &number);
         values.set(spans.mode_real, &number);
     }

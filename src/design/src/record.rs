@@ -143,7 +143,9 @@ impl Design {
                 "the schedule names a mode beyond the plant's {modes}"
             ));
         }
-        if let Truth::Linear { plant: truth } = &self.truth
+        let (motion, deviation) = self.truth.clone().into_parts();
+        deviation.check(plant)?;
+        if let Truth::Linear { plant: truth } = &motion
             && (Dimensions::check(truth)? != dims || truth.modes.len() != modes)
         {
             return Err("the true plant has other sizes than the designed one".into());

@@ -11,6 +11,7 @@
 //! disturbance and `f` the additive sensor fault. Everything is in the user's physical units.
 
 mod continuous;
+pub mod deviation;
 mod dimensions;
 pub mod noise;
 pub mod rectifier;
@@ -19,6 +20,7 @@ pub mod scaling;
 pub mod scenario;
 mod truth;
 
+pub use deviation::Deviation;
 pub use dimensions::Dimensions;
 pub use scenario::Scenario;
 pub use truth::Truth;

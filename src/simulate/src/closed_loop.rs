@@ -133,7 +133,7 @@ impl Regulator for Tolerant<'_> {
         };
         let sample = Sample {
             tick: seen.tick,
-            mode: seen.mode,
+            mode: seen.told,
             measurement: &seen.y,
             reference: &seen.reference,
             thresholds: &self.controller.parameters().estimator.thresholds,

@@ -1,17 +1,20 @@
 //! The plant under a scenario, sample by sample: what the plant FMU runs.
 
+mod departure;
 mod derivative;
 mod rectifier;
 
+use departure::Departed;
 pub use derivative::Change;
 
 use super::integrate::Stalled;
+use departure::Departed;
 use ftc_control::kernel;
 use ftc_control::state::State;
 use ftc_plant::Truth;
 use ftc_plant::noise;
 use ftc_plant::scenario::{FaultEvent, Scenario};
-use ftc_plant::{Mode, SwitchedPlant};
+use ftc_plant::{Deviation, Mode, SwitchedPlant};
 use serde::{Deserialize, Serialize};
 
 /// A plant and its scenario: immutable, shared by any number of [`PlantState`]s.
@@ -19,6 +22,7 @@ use serde::{Deserialize, Serialize};
 pub struct PlantSimulator {
     plant: SwitchedPlant,
     truth: Truth,
+    deviation: Deviation,
     scenario: Scenario,
     offsets: Vec<Offsets>,
 }
@@ -52,6 +56,8 @@ pub struct PlantState {
     pub tick: u64,
     /// Active mode (0-based).
     pub mode: usize,
+    /// The mode (0-based) that is told to whoever controls the plant.
+    pub told: usize,
     /// State `x` (n).
     pub x: Vec<f64>,
     /// Measured output `y` (p).
@@ -70,6 +76,8 @@ pub struct PlantState {
     last: Vec<f64>,
     /// Scratch (n).
     next: Vec<f64>,
+    /// What the true plant's departures carry.
+    departed: Departed,
 }
 
 ftc_control::state!(PlantState {
@@ -82,10 +90,11 @@ ftc_control::state!(PlantState {
         reference,
         noise,
         last,
-        next
+        next,
+        departed
     ],
     constants: [],
-    counters: [tick, mode]
+    counters: [tick, mode, told]
 });
 
 impl PlantSimulator {
@@ -97,6 +106,7 @@ impl PlantSimulator {
     /// Prepares a plant; the scenario's signals and the truth must have the design's sizes.
     pub fn with_truth(designed: SwitchedPlant, truth: Truth, scenario: Scenario) -> Self {
         let plant = truth.linear(&designed).clone();
+        let (truth, deviation) = truth.into_parts();
         let collect = |v: nalgebra::DVector<f64>| v.iter().copied().collect::<Vec<f64>>();
         let offsets = plant.modes.iter().map(|mode| Offsets {
             state: collect(mode.state_offset()),
@@ -106,6 +116,7 @@ impl PlantSimulator {
             offsets: offsets.collect(),
             plant,
             truth,
+            deviation,
             scenario,
         }
     }
@@ -140,6 +151,7 @@ impl PlantSimulator {
         PlantState {
             tick: 0,
             mode,
+            told: mode,
             x: point.x.clone(),
             y: vec![0.0; dims.outputs],
             y_true: vec![0.0; dims.outputs],
@@ -149,6 +161,7 @@ impl PlantSimulator {
             noise: vec![0.0; dims.outputs],
             last: point.y.clone(),
             next: vec![0.0; dims.states],
+            departed: Departed::new(point, &self.deviation),
         }
     }
 
@@ -164,6 +177,8 @@ impl PlantSimulator {
         let scenario = &self.scenario;
         let built_in = external.mode.is_none();
         state.mode = self.active_mode(external, tick);
+        state.told = self.told_mode(external, state.mode, tick);
+        state.departed.plays = built_in;
         let Some((mode, offsets)) = self.described(state.mode) else {
             return;
         };
@@ -181,6 +196,7 @@ impl PlantSimulator {
         {
             *out = value(signal) + added;
         }
+        self.load_disturbance(state);
         for ((out, signal), &added) in state
             .fault
             .iter_mut()
@@ -214,6 +230,9 @@ impl PlantSimulator {
     /// [`Stalled`] where the nonlinear plant cannot be integrated; the tick then ends where that
     /// became so, and later ticks go on from there.
     pub fn advance(&self, state: &mut PlantState, u: &[f64]) -> Result<(), Stalled> {
+        self.actuate(state, u);
+        let applied = core::mem::take(&mut state.departed.applied);
+        let u = applied.as_slice();
         let result = match &self.truth {
             Truth::Rectifier(rectifier) => rectifier::advance_rectifier(
                 rectifier,
@@ -223,11 +242,14 @@ impl PlantSimulator {
                 &state.disturbance,
                 self.plant.sample_time,
             ),
-            Truth::AsDesigned | Truth::Linear { .. } => {
+            Truth::AsDesigned | Truth::Linear { .. } | Truth::Deviating { .. } => {
                 self.advance_linear(state, u);
                 Ok(())
             }
         };
+        state.departed.applied = applied;
+        self.load_state(state);
+        state.departed.read(&state.y_true);
         kernel::bound(&mut state.x);
         state.tick = state.tick.saturating_add(1);
         result
@@ -260,7 +282,7 @@ impl PlantSimulator {
     /// `y = y_true + f + noise`, unless an event replaces the reading.
     fn read_sensors(&self, state: &mut PlantState, events: bool) {
         let (tick, te) = (state.tick, self.plant.sample_time);
-        let clean = state.y_true.iter().zip(&state.noise);
+        let clean = state.departed.seen(&state.y_true).iter().zip(&state.noise);
         let read = state
             .y
             .iter_mut()
@@ -349,7 +371,7 @@ mod tests {
         ) {
             let simulator = simulator();
             let [x, y, y_true, fault, disturbance, reference, noise, last, next] = sizes.map(|size| vec![1.0; size]);
-            let mut state = PlantState { tick: 3, mode, x, y, y_true, fault, disturbance, reference, noise, last, next };
+            let mut state = PlantState { tick: 3, mode, x, y, y_true, fault, disturbance, reference, noise, last, next, told: mode, departed: Departed::default() };
             let (u, f, w) = (vec![1.0; m], vec![1.0; p], vec![1.0; s]);
             let external = External { fault: &f, disturbance: &w, mode: given, noise: true };
             simulator.advance(&mut state, &u).unwrap();

@@ -9,15 +9,16 @@ use crate::notes::Notes;
 use crate::plant;
 use crate::schema::{
     self, CompensationMethod, DesignFile, EstimatorMethod, LyapunovKind, ObjectiveKind,
-    ObserverKind, PlantModel, SignalInfo,
+    ObserverKind, SignalInfo,
 };
 use crate::signal::{Signal as SignalOverTime, Tables};
+use crate::true_plant;
 use crate::values::{NameOrList, NumberOrList};
 use ftc_control::parameters;
 use ftc_design::assembly::{DatabaseSource, EstimatorSpec, KnownDisturbance, Request, Threshold};
 use ftc_design::{ControlSpec, Lyapunov, Objective, ObserverSpec, Signal, Signals};
 use ftc_plant::scenario::{ModeInterval, Waveform};
-use ftc_plant::{Dimensions, OperatingPoint, Scenario, SwitchedPlant, Truth};
+use ftc_plant::{Dimensions, OperatingPoint, Scenario, SwitchedPlant};
 use std::path::Path;
 
 /// The largest number of states, inputs, outputs, disturbances or modes.
@@ -51,6 +52,7 @@ pub fn request_with_notes(
     at("name", check::identifier(&file.name))?;
     let given = plant::read(file, folder, notes)?;
     let signals = signals(&file.signals, &given)?;
+    let truth = true_plant::truth(file, &given, folder)?;
     let plant = given.plant;
     let dims = plant.dimensions();
     let disturbance = disturbance(file, dims)?;
@@ -86,7 +88,7 @@ pub fn request_with_notes(
         name: file.name.clone(),
         signals,
         plant,
-        truth: truth(file),
+        truth,
         control,
         bumpless: file.controller.bumpless.unwrap_or(defaults::BUMPLESS),
         feedforward: file.controller.feedforward.unwrap_or(defaults::FEEDFORWARD),
@@ -100,14 +102,6 @@ pub fn request_with_notes(
 /// Puts the key before a complaint.
 pub(crate) fn at<T>(key: &str, result: Result<T, String>) -> Result<T, String> {
     result.map_err(|what| format!("{key} {what}"))
-}
-
-/// What is simulated: the modes themselves, or the named model they are linearised from.
-fn truth(file: &DesignFile) -> Truth {
-    match &file.plant {
-        None => Truth::AsDesigned,
-        Some(PlantModel::Rectifier(rectifier)) => Truth::Rectifier(rectifier.clone()),
-    }
 }
 
 fn signals(given: &schema::Signals, found: &plant::Found) -> Result<Signals, String> {

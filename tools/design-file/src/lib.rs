@@ -10,6 +10,7 @@ pub mod schema;
 pub mod sentence;
 mod signal;
 pub mod suggest;
+mod true_plant;
 pub mod values;
 
 use schema::DesignFile;

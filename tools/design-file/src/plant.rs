@@ -17,9 +17,48 @@ pub(crate) struct Found {
     pub(crate) plant: SwitchedPlant,
     /// How many do.
     pub(crate) held_inputs: usize,
+    /// The modes as they stand in the file; none of a named model.
+    given: Vec<Given>,
+}
+
+impl Found {
+    /// This plant with other matrices, of the same sizes and treated in the same way.
+    pub(crate) fn with_other_matrices(
+        &self,
+        file: &DesignFile,
+        modes: &[schema::Mode],
+        folder: &Path,
+    ) -> Result<SwitchedPlant, String> {
+        if modes.len() != self.given.len() {
+            return Err(format!(
+                "mode has {} entries: give one for each of the {} modes, empty where nothing differs",
+                modes.len(),
+                self.given.len()
+            ));
+        }
+        let mut given = self.given.clone();
+        for (index, (own, other)) in given.iter_mut().zip(modes).enumerate() {
+            let source = Source::of(other, folder).map_err(|what| in_mode(index, &what))?;
+            own.replace(&source).map_err(|what| in_mode(index, &what))?;
+        }
+        let plant = assembled(file, &given)?;
+        if Dimensions::check(&plant)? != Dimensions::check(&assembled(file, &self.given)?)? {
+            return Err(
+                "the matrices have other sizes than those of the model: keep to them".into(),
+            );
+        }
+        let found = sampled_and_extended(file, plant, given)?;
+        if found.held_inputs != self.held_inputs {
+            return Err(
+                "D is that of the true plant alone: give the modes of the model one too".into(),
+            );
+        }
+        Ok(found.plant)
+    }
 }
 
 /// One mode as it stands in the file.
+#[derive(Clone)]
 struct Given {
     mode: Mode,
     /// `D` (p x m), if it is not zero.
@@ -47,22 +86,37 @@ pub(crate) fn read(file: &DesignFile, folder: &Path, notes: &Notes) -> Result<Fo
         }
         (None, false) => given_modes(file, folder)?,
     };
-    let mut plant = SwitchedPlant {
-        sample_time: file.sample_time,
-        modes: modes.iter().map(|given| given.mode.clone()).collect(),
-    };
+    let plant = assembled(file, &modes)?;
     bearable(&plant, Dimensions::check(&plant)?)?;
-    if file.continuous == Some(true) {
-        sample(&mut plant)?;
-    } else if plant.looks_continuous() {
+    if file.continuous != Some(true) && plant.looks_continuous() {
         notes.add(
             "every eigenvalue of A has a negative real part, as in a stable continuous-time model, but A and B are \
              taken as discrete, x(k+1) = A x(k) + B u(k): set continuous = true if they describe dx/dt"
                 .into(),
         );
     }
-    let latency = file.controller.latency.unwrap_or(0);
-    extend(plant, &modes, latency)
+    sampled_and_extended(file, plant, modes)
+}
+
+/// The modes as one plant, as it stands in the file.
+fn assembled(file: &DesignFile, modes: &[Given]) -> Result<SwitchedPlant, String> {
+    let plant = SwitchedPlant {
+        sample_time: file.sample_time,
+        modes: modes.iter().map(|given| given.mode.clone()).collect(),
+    };
+    Dimensions::check(&plant).map(|_| plant)
+}
+
+/// In samples, and without direct feedthrough.
+fn sampled_and_extended(
+    file: &DesignFile,
+    mut plant: SwitchedPlant,
+    given: Vec<Given>,
+) -> Result<Found, String> {
+    if file.continuous == Some(true) {
+        sample(&mut plant)?;
+    }
+    extend(plant, given, file.controller.latency.unwrap_or(0))
 }
 
 /// A named model, which is sampled and has no feedthrough.
@@ -78,6 +132,7 @@ fn named(model: &PlantModel, file: &DesignFile) -> Result<Found, String> {
     Ok(Found {
         plant,
         held_inputs: 0,
+        given: Vec::new(),
     })
 }
 
@@ -99,11 +154,12 @@ fn sample(plant: &mut SwitchedPlant) -> Result<(), String> {
 }
 
 /// Makes states of inputs that act on outputs directly.
-fn extend(mut plant: SwitchedPlant, given: &[Given], latency: i64) -> Result<Found, String> {
+fn extend(mut plant: SwitchedPlant, given: Vec<Given>, latency: i64) -> Result<Found, String> {
     let Some(first) = given.iter().position(|mode| mode.feedthrough.is_some()) else {
         return Ok(Found {
             plant,
             held_inputs: 0,
+            given,
         });
     };
     if latency == 0 {
@@ -116,7 +172,7 @@ fn extend(mut plant: SwitchedPlant, given: &[Given], latency: i64) -> Result<Fou
     let Dimensions {
         inputs, outputs, ..
     } = plant.dimensions();
-    for (index, (mode, given)) in plant.modes.iter_mut().zip(given).enumerate() {
+    for (index, (mode, given)) in plant.modes.iter_mut().zip(&given).enumerate() {
         let none = DMatrix::zeros(outputs, inputs);
         let feedthrough = given.feedthrough.as_ref().unwrap_or(&none);
         if feedthrough.shape() != (outputs, inputs) {
@@ -133,6 +189,7 @@ fn extend(mut plant: SwitchedPlant, given: &[Given], latency: i64) -> Result<Fou
     Ok(Found {
         plant,
         held_inputs: inputs,
+        given,
     })
 }
 
@@ -333,6 +390,31 @@ fn mode(source: &Source, number: usize, disturbances: usize) -> Result<Given, St
         },
         feedthrough: feedthrough.filter(|d| d.iter().any(|&entry| entry != 0.0)),
     })
+}
+
+impl Given {
+    /// Puts the matrices that `source` has in the place of these.
+    fn replace(&mut self, source: &Source) -> Result<(), String> {
+        let mode = &mut self.mode;
+        for (name, matrix) in [
+            ("A", &mut mode.a),
+            ("B", &mut mode.b),
+            ("C", &mut mode.c),
+            ("E", &mut mode.e),
+            ("F", &mut mode.f),
+        ] {
+            if let Some(other) = source.optional(name)? {
+                *matrix = other;
+            }
+        }
+        if let Some(other) = source.optional("D")? {
+            self.feedthrough = Some(other);
+        }
+        if source.given.operating_point.is_some() {
+            return Err("operating_point is that of the model: leave it out".into());
+        }
+        Ok(())
+    }
 }
 
 fn matrix(name: &str, given: &[Vec<f64>]) -> Result<DMatrix<f64>, String> {

@@ -287,6 +287,65 @@ pub struct Scenario {
     pub disturbance: Option<Vec<Signal>>,
     /// Faults that are more than an addition.
     pub events: Option<Vec<Event>>,
+    /// How the true plant departs from the model.
+    pub plant: Option<TruePlant>,
+}
+
+/// `[scenario.plant]`: the true plant, as far as it is not what the design is made for.
+#[derive(Clone, Debug, Default, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct TruePlant {
+    /// Other matrices, one entry per mode; a matrix that is left out is that of the model.
+    #[serde(rename = "mode")]
+    pub modes: Option<Vec<Mode>>,
+    /// Largest relative error of the entries of `A`, `B` and `E`.
+    pub relative_error: Option<f64>,
+    /// Seed of these errors.
+    pub seed: Option<i64>,
+    /// Gain of each actuator (number or m).
+    pub input_gain: Option<NumberOrList>,
+    /// Samples by which every reading is late.
+    pub sensor_delay: Option<i64>,
+    /// Samples by which the mode is told late.
+    pub mode_delay: Option<i64>,
+    /// Times at which another mode is told.
+    pub told: Option<Vec<Told>>,
+    /// Constants added to inputs, disturbances or states for a while.
+    pub loads: Option<Vec<Load>>,
+    /// Faults of actuators; they name an `input` where a sensor's name a `sensor`.
+    pub actuator: Option<Vec<Event>>,
+}
+
+/// Another mode is told for a while.
+#[derive(Clone, Copy, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Told {
+    /// Seconds.
+    pub from: f64,
+    /// Seconds.
+    #[serde(default = "crate::signal::for_ever")]
+    pub until: f64,
+    /// Number of the mode, from 1.
+    pub mode: i64,
+}
+
+/// A constant added to an input, a disturbance or a state.
+#[derive(Clone, Copy, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Load {
+    /// Number of the input, from 1.
+    pub input: Option<i64>,
+    /// Number of the disturbance, from 1.
+    pub disturbance: Option<i64>,
+    /// Number of the state, from 1.
+    pub state: Option<i64>,
+    /// Seconds.
+    pub from: f64,
+    /// Seconds.
+    #[serde(default = "crate::signal::for_ever")]
+    pub until: f64,
+    /// What is added.
+    pub size: f64,
 }
 
 /// A mode (from 1) and the time in seconds from which it is active.

@@ -94,6 +94,7 @@ pub struct Tables<'a> {
 pub enum Event {
     /// Adds `size`.
     Bias {
+        #[serde(alias = "input")]
         sensor: i64,
         from: f64,
         #[serde(default = "for_ever")]
@@ -102,6 +103,7 @@ pub enum Event {
     },
     /// Adds `slope` per second.
     Drift {
+        #[serde(alias = "input")]
         sensor: i64,
         from: f64,
         #[serde(default = "for_ever")]
@@ -110,6 +112,7 @@ pub enum Event {
     },
     /// Loses the fraction `loss` of the reading.
     GainLoss {
+        #[serde(alias = "input")]
         sensor: i64,
         from: f64,
         #[serde(default = "for_ever")]
@@ -118,6 +121,7 @@ pub enum Event {
     },
     /// Keeps the last reading.
     Stuck {
+        #[serde(alias = "input")]
         sensor: i64,
         from: f64,
         #[serde(default = "for_ever")]
@@ -125,6 +129,7 @@ pub enum Event {
     },
     /// Adds `size` during the first half of each `period`.
     Intermittent {
+        #[serde(alias = "input")]
         sensor: i64,
         from: f64,
         #[serde(default = "for_ever")]
@@ -134,6 +139,7 @@ pub enum Event {
     },
     /// Gives no number.
     Dropout {
+        #[serde(alias = "input")]
         sensor: i64,
         from: f64,
         #[serde(default = "for_ever")]
@@ -142,7 +148,7 @@ pub enum Event {
 }
 
 /// An end that never comes.
-fn for_ever() -> f64 {
+pub(crate) fn for_ever() -> f64 {
     f64::MAX
 }
 
@@ -238,6 +244,18 @@ impl Event {
     /// # Errors
     /// One sentence, to be put after the event's key.
     pub fn fault(&self, sensors: usize) -> Result<FaultEvent, String> {
+        self.fault_of("sensor", sensors, "outputs")
+    }
+
+    /// The event for an actuator of a plant with `inputs` inputs.
+    ///
+    /// # Errors
+    /// One sentence, to be put after the event's key.
+    pub fn actuator_fault(&self, inputs: usize) -> Result<FaultEvent, String> {
+        self.fault_of("input", inputs, "inputs")
+    }
+
+    fn fault_of(&self, what: &str, count: usize, things: &str) -> Result<FaultEvent, String> {
         let (sensor, from, until, kind) = match *self {
             Self::Bias {
                 sensor,
@@ -294,7 +312,7 @@ impl Event {
             } => (sensor, from, until, FaultKind::Dropout),
         };
         interval(from, until)?;
-        let sensor = crate::check::index("sensor", sensor, sensors, "outputs")?;
+        let sensor = crate::check::index(what, sensor, count, things)?;
         Ok(FaultEvent {
             sensor,
             from,
@@ -304,7 +322,7 @@ impl Event {
     }
 }
 
-fn finite(key: &str, value: f64) -> Result<f64, String> {
+pub(crate) fn finite(key: &str, value: f64) -> Result<f64, String> {
     crate::check::number(value)
         .map(|()| value)
         .map_err(|what| format!("{key} {what}"))
@@ -316,7 +334,7 @@ fn positive(key: &str, value: f64) -> Result<f64, String> {
         .map_err(|what| format!("{key} {what}"))
 }
 
-fn interval(from: f64, until: f64) -> Result<(), String> {
+pub(crate) fn interval(from: f64, until: f64) -> Result<(), String> {
     if !(from.is_finite() && from >= 0.0) {
         return Err(format!(
             "from is {from}: give a time in seconds, 0 or later"

@@ -1,6 +1,7 @@
 //! Every variant of the loop, simulated natively and written down sample by sample.
 
 use crate::baselines;
+use crate::robustness;
 use crate::warnings;
 use ftc_control::Controller;
 use ftc_design::Design;
@@ -20,7 +21,7 @@ pub struct Simulation {
 }
 
 /// Runs the scenario in every variant, and with every baseline if asked for:
-/// `trajectories.csv`, `metrics.json` and the report. `warnings` are those of the design.
+/// `trajectories.csv`, `metrics.json`, `robustness.json` and the report. `warnings` are those of the design.
 ///
 /// # Errors
 /// One sentence about a baseline.
@@ -36,20 +37,26 @@ pub fn simulate(
         bound = Some(baselines::bound(design, &trajectories[0]));
     }
     warnings.extend(warnings::of_runs(design, &trajectories));
+    let cases = robustness::cases(design);
+    warnings.extend(robustness::warnings(design, &cases));
     let csv = table(design, &trajectories).map_err(|error| error.to_string())?;
     let metrics = metrics(design, &trajectories, bound.as_deref(), &warnings);
+    let tried = format!("{:#}\n", robustness::json(&cases));
     let mut files = vec![
         ("trajectories.csv".to_string(), csv),
         ("metrics.json".to_string(), metrics.into_bytes()),
+        ("robustness.json".to_string(), tried.into_bytes()),
     ];
-    let page = crate::files(design, &trajectories, &warnings);
+    let section = robustness::section(design, &cases);
+    let page = crate::files(design, &trajectories, &warnings, section);
     files.extend(
         page.into_iter()
             .map(|(name, text)| (name, text.into_bytes())),
     );
     Ok(Simulation {
         files,
-        summary: summary(design, &trajectories, bound.as_deref()),
+        summary: summary(design, &trajectories, bound.as_deref())
+            + &robustness::text(design, &cases),
         warnings,
     })
 }

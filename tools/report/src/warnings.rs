@@ -413,7 +413,7 @@ fn stalled(design: &Design, run: &Trajectory) -> Option<String> {
 
 /// A rectifier that fell to where it no longer is the one of the design.
 fn held_up(design: &Design, run: &Trajectory) -> Option<String> {
-    let Truth::Rectifier(rectifier) = &design.truth else {
+    let (Truth::Rectifier(rectifier), _) = &design.truth.clone().into_parts() else {
         return None;
     };
     let floor = rectifier.diode_voltage();
