@@ -1,4 +1,4 @@
-# The roads a person and a machine take. Everything needed beyond Rust, a C compiler, Python 3.11
+# What a person and CI run. Everything needed beyond Rust, a C compiler, Python 3.11
 # or later and make is installed into .venv by the rules below.
 
 PYTHON ?= python3
@@ -108,6 +108,7 @@ lint: $(VENV)/ready
 	RUSTDOCFLAGS="-D warnings" cargo doc --workspace --no-deps
 	$(IN_VENV)ruff check
 	$(IN_VENV)ruff format --check
+	$(PYTHON) tests/promises.py
 
 clean:
 	cargo clean

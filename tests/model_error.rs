@@ -1,5 +1,7 @@
 //! The promise survives a wrong model: gains from matrices that are off by 10 %, the predictor from
 //! a healthy log of the true plant, and still as good as being told the fault.
+//!
+//! promise: model-error
 
 mod common;
 
@@ -65,6 +67,7 @@ fn design(model: &SwitchedPlant, truth: &SwitchedPlant, noise: f64) -> Design {
         kind: ObserverChoice::Auto,
         decay: 0.7,
         lyapunov: ftc_design::Lyapunov::Common,
+        noise: Vec::new(),
     };
     assemble(Request {
         name: "wrong".into(),

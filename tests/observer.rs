@@ -1,4 +1,6 @@
 //! The observer: existence, decoupling, decay under every switching, units.
+//!
+//! promise: certified-gains
 
 mod plants;
 
@@ -15,6 +17,7 @@ fn spec(kind: ObserverChoice, decay: f64, lyapunov: Lyapunov) -> ObserverSpec {
         kind,
         decay,
         lyapunov,
+        noise: Vec::new(),
     }
 }
 

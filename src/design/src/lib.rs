@@ -18,10 +18,13 @@ pub mod lmi;
 mod lyapunov;
 pub mod observer;
 mod record;
+pub(crate) mod riccati;
 mod spec;
 pub mod state_feedback;
 mod units;
 mod verdict;
+#[cfg(feature = "solver")]
+pub mod warnings;
 
 use ftc_plant::SwitchedPlant;
 #[cfg(feature = "solver")]
@@ -32,7 +35,7 @@ use serde::{Deserialize, Serialize};
 pub use certificate::{CertificateError, ControlCertificate};
 pub use controllability::check_controllable;
 pub use lyapunov::{DwellTime, Lyapunov};
-pub use observer::{ObserverCertificate, ObserverDesign};
+pub use observer::{LostCertificate, ObserverCertificate, ObserverDesign};
 pub use record::{Design, FORMAT, Signal, Signals};
 pub use spec::{ControlSpec, Objective, ObserverChoice, ObserverSpec};
 pub use state_feedback::{ModeGains, StateFeedback};
@@ -74,9 +77,11 @@ pub fn synthesise(
     observer: &ObserverSpec,
     scaling: &Scaling,
 ) -> Result<Synthesis, DesignError> {
+    let state_feedback = state_feedback::synthesise(plant, control, scaling)?;
+    let observer = observer::synthesise(plant, observer, scaling)?;
     Ok(Synthesis {
-        state_feedback: state_feedback::synthesise(plant, control, scaling)?,
-        observer: observer::synthesise(plant, observer, scaling)?,
+        state_feedback,
+        observer: observer::with_lost_sensors(plant, observer, observer::USUAL_RATIO),
     })
 }
 

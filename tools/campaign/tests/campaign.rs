@@ -14,9 +14,10 @@ fn design() -> &'static Design {
     static DESIGN: OnceLock<Design> = OnceLock::new();
     DESIGN.get_or_init(|| {
         let examples = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../examples");
-        let mut file = design_file::read(&examples.join("paper.toml")).unwrap();
-        file.scenario.steps = Some(300);
-        let request = design_file::assemble::request(&file, &examples).unwrap();
+        let mut request = design_file::read(&examples.join("paper.toml"))
+            .unwrap()
+            .request;
+        request.scenario.steps = 300;
         ftc_design::assembly::assemble(request).unwrap()
     })
 }

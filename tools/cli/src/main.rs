@@ -17,11 +17,10 @@ mod failure;
 mod progress;
 
 use clap::{Parser, Subcommand, ValueEnum};
-use design_file::notes::Notes;
-use design_file::schema::DesignFile;
+use design_file::Loaded;
 use failure::Failure;
 use ftc_design::Design;
-use ftc_design::assembly::Request;
+use ftc_design::warnings::LoggedMovement;
 use package::output::Staging;
 use progress::Progress;
 use report::{summary, warnings};
@@ -318,25 +317,9 @@ fn write(out: &Path, files: &[(String, Vec<u8>)]) -> Result<(), Failure> {
 }
 
 /// Reads a design file.
-fn read(path: &Path, progress: &Progress) -> Result<Read, Failure> {
+fn read(path: &Path, progress: &Progress) -> Result<Loaded, Failure> {
     progress.tell("reading the design file");
-    let file = design_file::read(path).map_err(Failure::Input)?;
-    let folder = path.parent().unwrap_or(Path::new(""));
-    let notes = Notes::default();
-    let request = design_file::assemble::request_with_notes(&file, folder, &notes)
-        .map_err(|what| Failure::Input(format!("{}: {what}", path.display())))?;
-    Ok(Read {
-        file,
-        request,
-        notes: notes.into_sentences(),
-    })
-}
-
-/// A design file, what it asks for, and what its user should know of the files it names.
-struct Read {
-    file: DesignFile,
-    request: Request,
-    notes: Vec<String>,
+    design_file::read(path).map_err(|error| Failure::Input(error.to_string()))
 }
 
 /// A design, and what its user should know of it: one sentence each.
@@ -347,13 +330,14 @@ struct Made {
 
 /// Reads a design file and makes the design.
 fn solve(path: &Path, progress: &Progress) -> Result<Made, Failure> {
-    let Read {
+    let Loaded {
         file,
         request,
         notes,
+        ..
     } = read(path, progress)?;
     let asked = request.control.clone();
-    let logged = warnings::Logged::of(&request.estimator.database);
+    let logged = LoggedMovement::of(&request.estimator.database);
     progress.tell("solving for gains and certifying them");
     let design = ftc_design::assembly::assemble(request).map_err(|error| {
         eprint!("{}", warnings::text(&notes));

@@ -32,23 +32,12 @@ const LOG_ENDINGS: [&str; 4] = [".csv", ".tsv", ".txt", ".dat"];
 /// The most harmonics of a disturbance.
 const MOST_HARMONICS: usize = 50;
 
-/// Checks a design file and turns it into a request; other files are sought in `folder`.
+/// Checks a design file and turns it into a request; other files are sought in `folder`, and `notes`
+/// gets what the user should know of them.
 ///
 /// # Errors
 /// One sentence that names the key and what to do.
-pub fn request(file: &DesignFile, folder: &Path) -> Result<Request, String> {
-    request_with_notes(file, folder, &Notes::default())
-}
-
-/// As [`request`]; `notes` gets what the user should know of the files that were read.
-///
-/// # Errors
-/// One sentence that names the key and what to do.
-pub fn request_with_notes(
-    file: &DesignFile,
-    folder: &Path,
-    notes: &Notes,
-) -> Result<Request, String> {
+pub(crate) fn request(file: &DesignFile, folder: &Path, notes: &Notes) -> Result<Request, String> {
     at("name", check::identifier(&file.name))?;
     let given = plant::read(file, folder, notes)?;
     let signals = signals(&file.signals, &given)?;
@@ -69,7 +58,7 @@ pub fn request_with_notes(
         notes,
     };
     let estimator = estimator(&file.estimator, disturbance, dims, &logs)?;
-    let scenario = Play {
+    let scenario = ScenarioContext {
         scenario: &file.scenario,
         known: estimator.disturbance.as_ref(),
         tracked: &control.tracked,
@@ -338,10 +327,12 @@ fn observer(given: &schema::Observer, control: &ControlSpec) -> Result<ObserverS
         kind: match given.kind.unwrap_or(defaults::OBSERVER) {
             ObserverKind::Uio => Kind::Uio,
             ObserverKind::Luenberger => Kind::Luenberger,
+            ObserverKind::Kalman => Kind::Kalman,
             ObserverKind::Auto => Kind::Auto,
         },
         decay,
         lyapunov: control.lyapunov,
+        noise: Vec::new(),
     })
 }
 
@@ -494,7 +485,7 @@ fn compensation(file: &DesignFile) -> parameters::Compensation {
 }
 
 /// Everything the scenario depends on.
-struct Play<'a> {
+struct ScenarioContext<'a> {
     scenario: &'a schema::Scenario,
     known: Option<&'a KnownDisturbance>,
     tracked: &'a [usize],
@@ -504,7 +495,7 @@ struct Play<'a> {
     tables: Tables<'a>,
 }
 
-impl Play<'_> {
+impl ScenarioContext<'_> {
     fn resolve(&self) -> Result<Scenario, String> {
         let given = self.scenario;
         let steps = given.steps.map_or(Ok(defaults::STEPS), |steps| {

@@ -11,7 +11,6 @@
 //! size in pixels and spend a third of a phone's width on the legend.
 
 mod axis;
-pub mod baselines;
 mod decimate;
 mod demo;
 pub mod documentation;
@@ -19,8 +18,10 @@ pub mod figure;
 pub mod page;
 pub mod robustness;
 pub mod simulate;
+pub mod style;
 pub mod summary;
 mod svg;
+pub mod table;
 pub mod text;
 pub mod warnings;
 

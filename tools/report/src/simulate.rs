@@ -1,10 +1,11 @@
 //! Every variant of the loop, simulated natively and written down sample by sample.
 
-use crate::baselines;
 use crate::robustness;
+use crate::table::{Table, number};
 use crate::warnings;
 use ftc_control::Controller;
 use ftc_design::Design;
+use ftc_simulate::baselines::comparison;
 use ftc_simulate::closed_loop::{Merits, Record};
 use ftc_simulate::{PlantSimulator, Trajectory, Variant, run};
 use serde_json::{Map, Value, json};
@@ -33,8 +34,10 @@ pub fn simulate(
     let mut trajectories = trajectories(design);
     let mut bound = None;
     if baselines {
-        trajectories.extend(baselines::trajectories(design, &plant(design))?);
-        bound = Some(baselines::bound(design, &trajectories[0]));
+        trajectories.extend(
+            comparison::trajectories(design, &plant(design)).map_err(|error| error.to_string())?,
+        );
+        bound = Some(comparison::bound(design, &trajectories[0]));
     }
     warnings.extend(warnings::of_runs(design, &trajectories));
     let cases = robustness::cases(design);
@@ -84,12 +87,12 @@ pub fn one(design: &Design, variant: Variant) -> Trajectory {
 }
 
 /// One row per sample: `t`, `mode` and the signals of the scenario, then those of each variant.
-fn table(design: &Design, trajectories: &[Trajectory]) -> Result<Vec<u8>, csv::Error> {
-    let mut writer = csv::Writer::from_writer(Vec::new());
+fn table(design: &Design, trajectories: &[Trajectory]) -> csv::Result<Vec<u8>> {
     let records = trajectories.first().map_or(&[][..], |run| &run.records);
-    if let Some(first) = records.first() {
-        writer.write_record(header(first, trajectories))?;
-    }
+    let Some(first) = records.first() else {
+        return Ok(Vec::new());
+    };
+    let mut table = Table::new(header(first, trajectories))?;
     let mut row = Vec::new();
     for (at, record) in records.iter().enumerate() {
         row.clear();
@@ -111,11 +114,9 @@ fn table(design: &Design, trajectories: &[Trajectory]) -> Result<Vec<u8>, csv::E
                     .map(|&flag| u8::from(flag).to_string()),
             );
         }
-        writer.write_record(&row)?;
+        table.row(&row)?;
     }
-    writer
-        .into_inner()
-        .map_err(|error| error.into_error().into())
+    table.finish()
 }
 
 /// Signals that are the same in every variant.
@@ -157,11 +158,6 @@ fn header(record: &Record, trajectories: &[Trajectory]) -> Vec<String> {
         names.extend(vector(&prefix, "fault", record.flagged.len()));
     }
     names
-}
-
-/// The shortest text that reads back as the same double.
-fn number(value: f64) -> String {
-    format!("{value:?}")
 }
 
 /// Per variant `mse` and `vaf`, each measured and true, one number per tracked output; of the
