@@ -2,10 +2,11 @@
 
 mod departure;
 mod derivative;
+mod injection;
 mod rectifier;
 
-use departure::Departed;
 pub use derivative::Change;
+pub use injection::{Injected, LAST_INJECTED_KIND};
 
 use super::integrate::Stalled;
 use departure::Departed;

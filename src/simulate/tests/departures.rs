@@ -1,4 +1,6 @@
 //! A true plant that departs from its model: each departure by itself, against its definition.
+//!
+//! promise: true-plant
 #![allow(missing_docs)]
 
 use ftc_plant::deviation::{Load, Port, Told};

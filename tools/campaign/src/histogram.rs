@@ -115,7 +115,9 @@ mod tests {
     #[test]
     fn what_is_no_number_counts_as_unbounded() {
         let mut histogram = Histogram::default();
-        [f64::NAN, f64::INFINITY, 0.0].map(|value| histogram.add(value));
+        for value in [f64::NAN, f64::INFINITY, 0.0] {
+            histogram.add(value);
+        }
         assert_eq!(histogram.quantile(0.0), Some(0.0));
         assert_eq!(histogram.quantile(1.0), Some(f64::INFINITY));
         assert_eq!(Histogram::default().quantile(0.5), None);

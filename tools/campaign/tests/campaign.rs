@@ -1,4 +1,6 @@
 //! A campaign gives the same numbers however it is cut, and they are those of its runs.
+//!
+//! promise: exact-campaign
 #![allow(missing_docs)]
 
 use campaign::{MergeError, Options, Partial, draw, merge, run_one, run_shard, shard};

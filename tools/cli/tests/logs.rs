@@ -1,6 +1,7 @@
 //! Databases of healthy operation from CSV files: what is read, and what is refused in one sentence.
 //!
 //! promise: sound-logs
+//! promise: any-dialect
 #![allow(missing_docs)]
 
 mod common;

@@ -1,4 +1,6 @@
 //! Plants as engineers have them: continuous, with a direct feedthrough, in another tool's file.
+//!
+//! promise: plants-as-they-are
 #![allow(missing_docs)]
 
 mod common;

@@ -1,4 +1,6 @@
 //! `[scenario.plant]`, and what `simulate` tries on plants that are not quite the model's.
+//!
+//! promise: true-plant
 #![allow(missing_docs)]
 
 mod common;

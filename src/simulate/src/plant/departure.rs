@@ -19,12 +19,16 @@ pub struct Departed {
     held: Vec<f64>,
     /// True outputs that are on their way to the sensors, the oldest first (p times the delay).
     late: Vec<f64>,
+    /// Last readings outside any injected fault (p).
+    pub(super) reading: Vec<f64>,
+    /// Scratch for injected noise (p).
+    pub(super) draws: Vec<f64>,
     /// Whether the scenario plays.
     pub(super) plays: bool,
 }
 
 ftc_control::state!(Departed {
-    parts: [applied, change, held, late],
+    parts: [applied, change, held, late, reading, draws],
     constants: [],
     counters: [plays]
 });
@@ -37,6 +41,8 @@ impl Departed {
             change: vec![0.0; point.u.len()],
             held: point.u.clone(),
             late: point.y.repeat(deviation.sensor_delay),
+            reading: point.y.clone(),
+            draws: vec![0.0; point.y.len()],
             plays: true,
         }
     }
