@@ -126,6 +126,11 @@ fn errors(design: &Design, controller: &Controller, truth: Truth, variant: Varia
     squares
 }
 
+/// Whether a true mean square error with fault tolerance is worth a word beside the one without.
+fn is_worse(with: f64, without: f64, nominal: f64) -> bool {
+    with.sqrt() > NEGLIGIBLE * nominal && with > (1.0 + WORSE) * without
+}
+
 /// A sentence for every case and output in which fault tolerance does worse than none.
 pub fn warnings(design: &Design, cases: &[Case]) -> Vec<String> {
     let tracked = &design.controller.feedback.tracked;
@@ -133,8 +138,7 @@ pub fn warnings(design: &Design, cases: &[Case]) -> Vec<String> {
         let outputs = tracked.iter().zip(case.with.iter().zip(&case.without));
         outputs.filter_map(|(&row, (&with, &without))| {
             let output = &design.signals.outputs[row];
-            let matters = with.sqrt() > NEGLIGIBLE * output.nominal;
-            (matters && with > (1.0 + WORSE) * without).then(|| {
+            is_worse(with, without, output.nominal).then(|| {
                 format!(
                     "{}: {} follows its reference worse with fault tolerance than without (true MSE {with:.3e} against \
                      {without:.3e}): raise estimator.sigmas or threshold, or see whether its faults are worth detecting",
@@ -223,4 +227,17 @@ pub fn json(cases: &[Case]) -> Value {
             })
         })
         .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::is_worse;
+
+    #[test]
+    fn worse_is_what_is_larger_and_matters() {
+        assert!(is_worse(0.02, 0.01, 1.0) && is_worse(f64::INFINITY, 1.0, 1.0));
+        assert!(!is_worse(0.01, 0.01, 1.0) && !is_worse(0.01, 0.02, 1.0));
+        assert!(!is_worse(1e-8, 1e-9, 1.0) && is_worse(1e-8, 1e-9, 1e-3));
+        assert!(!is_worse(0.010_05, 0.01, 1.0));
+    }
 }
