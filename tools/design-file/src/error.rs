@@ -24,7 +24,7 @@ pub struct Error {
 
 impl Error {
     /// A complaint about the file as a whole.
-    pub(crate) fn of_file(sentence: impl Into<String>) -> Self {
+    pub fn of_file(sentence: impl Into<String>) -> Self {
         Self {
             file: None,
             key: None,
@@ -34,7 +34,7 @@ impl Error {
     }
 
     /// A complaint about what `text` asks for. The sentence begins with the key, if one is at fault.
-    pub(crate) fn of_request(text: &str, sentence: String) -> Self {
+    pub fn of_request(text: &str, sentence: String) -> Self {
         let found = DeTable::parse(text).ok().and_then(|document| {
             let mut keys = leading_keys(&sentence).into_iter();
             keys.find_map(|key| Some((key, line_of(text, document.get_ref(), key)?)))
@@ -48,7 +48,7 @@ impl Error {
     }
 
     /// The same error, found in this file.
-    pub(crate) fn in_file(self, file: &Path) -> Self {
+    pub fn in_file(self, file: &Path) -> Self {
         Self {
             file: Some(file.to_path_buf()),
             ..self

@@ -88,7 +88,11 @@ pub fn noise_is_unknown(file: &DesignFile) -> bool {
     unknown && estimator.method != Some(schema::EstimatorMethod::None)
 }
 
-fn load(path: &Path) -> Result<String, String> {
+/// The text of a design file.
+///
+/// # Errors
+/// The end of a sentence that begins with the file's name.
+pub fn load(path: &Path) -> Result<String, String> {
     let mut bytes = Vec::new();
     ftc_tables::open_regular(path, LARGEST_FILE)
         .map_err(|what| match path.is_dir() {

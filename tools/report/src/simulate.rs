@@ -19,6 +19,8 @@ pub struct Simulation {
     pub summary: String,
     /// What its user should know of the design and of the runs.
     pub warnings: Vec<String>,
+    /// Every variant and baseline, sample by sample.
+    pub trajectories: Vec<Trajectory>,
 }
 
 /// Runs the scenario in every variant, and with every baseline if asked for:
@@ -61,6 +63,7 @@ pub fn simulate(
         summary: summary(design, &trajectories, bound.as_deref())
             + &robustness::text(design, &cases),
         warnings,
+        trajectories,
     })
 }
 

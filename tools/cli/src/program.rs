@@ -25,10 +25,10 @@ use package::output::Staging;
 use progress::Progress;
 use report::{summary, warnings};
 use serde_json::json;
+use std::ffi::OsString;
 use std::fmt::Write as _;
 use std::io::Write;
 use std::path::{Path, PathBuf};
-use std::process::ExitCode;
 
 /// Design, certify, export and simulate sensor-fault-tolerant controllers for switched linear plants.
 ///
@@ -142,6 +142,13 @@ enum Command {
     },
 }
 
+/// Exit code: done.
+const DONE: u8 = 0;
+/// Exit code: no such controller, or a promise that does not hold.
+const NO_SUCH: u8 = 1;
+/// Exit code: the command line, a file or an output is at fault.
+const INPUT: u8 = 2;
+
 /// What can be reproduced.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 enum Experiment {
@@ -151,11 +158,24 @@ enum Experiment {
     Converter,
 }
 
-fn main() -> ExitCode {
-    let arguments = Arguments::parse();
-    match run(&arguments) {
-        Ok(_) if arguments.quiet => ExitCode::SUCCESS,
-        Ok(text) => print(&text).map_or_else(unprinted, |()| ExitCode::SUCCESS),
+/// Runs the program with its arguments (the first is its name) and returns its exit code.
+///
+/// FMU binaries are sought in `binaries`, by default beside the running program.
+pub fn main(arguments: Vec<OsString>, binaries: Option<PathBuf>) -> u8 {
+    let arguments = match Arguments::try_parse_from(arguments) {
+        Ok(arguments) => arguments,
+        Err(error) => {
+            // Help and version are no errors; to whom they go, clap knows.
+            let printed = error.print();
+            return match (error.exit_code(), printed) {
+                (0, Err(error)) => unprinted(error),
+                (code, _) => u8::try_from(code).unwrap_or(INPUT),
+            };
+        }
+    };
+    match run(&arguments, binaries) {
+        Ok(_) if arguments.quiet => DONE,
+        Ok(text) => print(&text).map_or_else(unprinted, |()| DONE),
         Err(failure) => {
             let printed = failure.output().map_or(Ok(()), print);
             eprintln!("error: {failure}");
@@ -165,7 +185,7 @@ fn main() -> ExitCode {
 }
 
 /// Runs the command and returns what to print.
-fn run(arguments: &Arguments) -> Result<String, Failure> {
+fn run(arguments: &Arguments, binaries: Option<PathBuf>) -> Result<String, Failure> {
     let progress = Progress::new(arguments.quiet);
     match &arguments.command {
         Command::Design {
@@ -187,7 +207,7 @@ fn run(arguments: &Arguments) -> Result<String, Failure> {
         Command::Export { design, out, ssp } => {
             check_output(out)?;
             let made = solve(design, &progress)?;
-            export(&made, out, *ssp)
+            export(&made, out, *ssp, binaries)
         }
         Command::Simulate {
             design,
@@ -227,11 +247,17 @@ fn verify(fmu: &Path, as_json: bool) -> Result<String, Failure> {
 }
 
 /// Writes both FMUs and says for which platforms.
-fn export(made: &Made, out: &Path, ssp: bool) -> Result<String, Failure> {
+fn export(
+    made: &Made,
+    out: &Path,
+    ssp: bool,
+    binaries: Option<PathBuf>,
+) -> Result<String, Failure> {
     let options = package::Options {
         out: out.to_path_buf(),
-        binaries: beside_program()?,
+        binaries: binaries.map_or_else(beside_program, Ok)?,
         ssp,
+        platforms: None,
     };
     let exported = package::export(&made.design, &options)?;
     let mut text = String::new();
@@ -359,7 +385,7 @@ fn print(text: &str) -> std::io::Result<()> {
 }
 
 /// What the reader of standard output asked for is lost.
-fn unprinted(error: std::io::Error) -> ExitCode {
+fn unprinted(error: std::io::Error) -> u8 {
     eprintln!("error: standard output cannot be written to ({error}): send it elsewhere");
-    ExitCode::from(2)
+    INPUT
 }
