@@ -115,6 +115,7 @@ fn signals(given: &schema::Signals, found: &plant::Found) -> Result<Signals, Str
         inputs,
         outputs,
         states,
+        disturbances: Vec::new(),
     })
 }
 
