@@ -139,7 +139,7 @@ pub fn design(dice: &mut Dice) -> Design {
                 }),
             },
             compensation: Compensation::VirtualSensor,
-            truth: ftc_plant::Truth::AsDesigned,
+            true_plant: ftc_plant::TruePlant::AsDesigned,
             scenario,
         };
         if let Ok(design) = assemble(request) {

@@ -1,15 +1,17 @@
 //! Everything the controller needs to know before its first tick: plain, serialisable data.
 
-use ftc_plant::SwitchedPlant;
-use ftc_plant::rows;
-use nalgebra::DMatrix;
+use crate::matrix::Matrix;
+use alloc::string::String;
+use alloc::vec::Vec;
 use serde::{Deserialize, Serialize};
 
 /// A complete controller: the model it observes, its gains, its predictor, its decisions.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct ControllerParameters {
-    /// The plant as designed for (physical units).
-    pub plant: SwitchedPlant,
+    /// Sample time `Te` in seconds.
+    pub sample_time: f64,
+    /// The plant's modes as designed for (physical units); mode number `i` of the user is `modes[i - 1]`.
+    pub modes: Vec<ModeModel>,
     /// State feedback with integral action.
     pub feedback: StateFeedback,
     /// State observer.
@@ -20,6 +22,24 @@ pub struct ControllerParameters {
     pub compensation: Compensation,
     /// Limits of each input (m); the command is clamped to them.
     pub input_limits: Vec<Limits>,
+}
+
+/// One mode of the plant, linear about its operating point:
+/// `x(k+1) = x0 + A (x - x0) + B (u - u0)`, `y = y0 + C (x - x0)`.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct ModeModel {
+    /// State matrix `A` (n x n).
+    pub a: Matrix,
+    /// Input matrix `B` (n x m).
+    pub b: Matrix,
+    /// Output matrix `C` (p x n).
+    pub c: Matrix,
+    /// State `x0` of the operating point (n).
+    pub x0: Vec<f64>,
+    /// Input `u0` of the operating point (m).
+    pub u0: Vec<f64>,
+    /// Output `y0` of the operating point (p).
+    pub y0: Vec<f64>,
 }
 
 /// A closed interval; an absent end is unbounded.
@@ -82,24 +102,18 @@ impl StateFeedback {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct FeedbackGains {
     /// `K_i` (m x n).
-    #[serde(with = "rows")]
-    pub state_feedback: DMatrix<f64>,
+    pub state_feedback: Matrix,
     /// `G_i` (m x q); `q = r` without resonators.
-    #[serde(with = "rows")]
-    pub integral: DMatrix<f64>,
+    pub integral: Matrix,
     /// `N_i` (m x r; zero columns without feedforward): what a new reference does to the command
     /// before the integrators have taken it in.
-    #[serde(with = "rows")]
-    pub feedforward: DMatrix<f64>,
+    pub feedforward: Matrix,
     /// Gain on the command still acting (m x m; zero columns when latency is 0).
-    #[serde(with = "rows")]
-    pub previous_input: DMatrix<f64>,
+    pub previous_input: Matrix,
     /// Back-calculation gain (q x m): how a saturated command unwinds the integrator.
-    #[serde(with = "rows")]
-    pub anti_windup: DMatrix<f64>,
+    pub anti_windup: Matrix,
     /// `K_i C_i^+` (m x p): what a fault does to the command at once, in the printed control (37).
-    #[serde(with = "rows")]
-    pub output_feedback: DMatrix<f64>,
+    pub output_feedback: Matrix,
 }
 
 /// Which observer was designed.
@@ -122,10 +136,10 @@ pub struct Observer {
     /// Why this kind, where the user left the choice open.
     pub note: Option<String>,
     /// Output-injection gain `K_i*` of (13) per mode (n x p each).
-    pub gains: Vec<Gain>,
+    pub gains: Vec<Matrix>,
     /// `H_ij` of (14): `decoupling[i][j]` corrects on entering mode `j` from mode `i` (n x p each).
-    pub decoupling: Vec<Vec<Gain>>,
-    /// Gains for each set of lost sensors from whose rest the state can be observed, the smallest
+    pub decoupling: Vec<Vec<Matrix>>,
+    /// Matrixs for each set of lost sensors from whose rest the state can be observed, the smallest
     /// sets first; a set that is not listed is not served. With none lost, the gains above are used.
     #[serde(default)]
     pub lost: Vec<LostSet>,
@@ -141,13 +155,8 @@ pub struct LostSet {
     /// Which sensors (rows of `C`, from 0) are lost, in ascending order; never empty.
     pub sensors: Vec<usize>,
     /// `H` of each mode (n x p each); the columns of the lost sensors are zero.
-    pub correction: Vec<Gain>,
+    pub correction: Vec<Matrix>,
 }
-
-/// A matrix on its own, written as its rows.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(transparent)]
-pub struct Gain(#[serde(with = "rows")] pub DMatrix<f64>);
 
 /// How faults are estimated.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -197,11 +206,9 @@ pub struct Estimator {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Predictor {
     /// `Y1 U1^+` (p x m j).
-    #[serde(with = "rows")]
-    pub response: DMatrix<f64>,
+    pub response: Matrix,
     /// `R` of the QR factorisation of `U1'` (m j x m j, upper triangular): gives the leverage.
-    #[serde(with = "rows")]
-    pub factor: DMatrix<f64>,
+    pub factor: Matrix,
     /// Standard deviation of the residual on the database, per sensor (p).
     pub deviation: Vec<f64>,
     /// Samples in the database.
@@ -225,11 +232,9 @@ pub struct Harmonics {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct PhasorMap {
     /// Real part.
-    #[serde(with = "rows")]
-    pub real: DMatrix<f64>,
+    pub real: Matrix,
     /// Imaginary part.
-    #[serde(with = "rows")]
-    pub imaginary: DMatrix<f64>,
+    pub imaginary: Matrix,
 }
 
 /// How the estimated fault is compensated.

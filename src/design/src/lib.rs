@@ -18,6 +18,7 @@ pub mod harmonics;
 #[cfg(feature = "solver")]
 pub mod lmi;
 mod lyapunov;
+mod matrices;
 pub mod observer;
 mod record;
 pub(crate) mod riccati;
@@ -38,8 +39,9 @@ use serde::{Deserialize, Serialize};
 pub use certificate::{CertificateError, ControlCertificate};
 pub use controllability::check_controllable;
 pub use lyapunov::{DwellTime, Lyapunov};
+pub use matrices::{dense, mode_models, plain};
 pub use observer::{LostCertificate, ObserverCertificate, ObserverDesign};
-pub use record::{Design, FORMAT, Signal, Signals};
+pub use record::{ControllerDesign, Design, FORMAT, Signal, Signals};
 pub use running_loop::{LostSensors, RunningLoop, SwitchingGain};
 pub use spec::{ControlSpec, Objective, ObserverChoice, ObserverSpec};
 pub use state_feedback::{ModeGains, StateFeedback};

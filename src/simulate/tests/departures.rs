@@ -5,7 +5,7 @@
 
 use ftc_plant::deviation::{Load, Port, Told};
 use ftc_plant::scenario::{FaultEvent, FaultKind, ModeInterval, Scenario, Waveform};
-use ftc_plant::{Deviation, Mode, OperatingPoint, SwitchedPlant, Truth};
+use ftc_plant::{Deviation, Mode, OperatingPoint, SwitchedPlant, TruePlant};
 use ftc_simulate::plant::{Change, External};
 use ftc_simulate::{PlantSimulator, PlantState};
 use nalgebra::{DVector, dmatrix};
@@ -54,8 +54,8 @@ fn scenario() -> Scenario {
 
 /// One state per sample under the command `3 + k / 10`.
 fn run(deviation: Deviation) -> Vec<PlantState> {
-    let truth = Truth::AsDesigned.with_deviation(deviation);
-    let simulator = PlantSimulator::with_truth(plant(), truth, scenario());
+    let truth = TruePlant::AsDesigned.with_deviation(deviation);
+    let simulator = PlantSimulator::with_true_plant(plant(), truth, scenario());
     let mut state = simulator.initial_state();
     let external = External {
         fault: &[0.0],
@@ -273,8 +273,8 @@ fn derivatives_know_the_departures() {
             true,
         ),
     ] {
-        let truth = Truth::AsDesigned.with_deviation(deviation);
-        let simulator = PlantSimulator::with_truth(plant(), truth, scenario());
+        let truth = TruePlant::AsDesigned.with_deviation(deviation);
+        let simulator = PlantSimulator::with_true_plant(plant(), truth, scenario());
         let external = External {
             fault: &[0.0],
             disturbance: &[0.0],

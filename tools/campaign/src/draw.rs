@@ -3,7 +3,7 @@
 use crate::Options;
 use ftc_design::Design;
 use ftc_plant::scenario::{FaultEvent, FaultKind, ModeInterval, Scenario, Waveform};
-use ftc_plant::{Mode, SwitchedPlant, Truth};
+use ftc_plant::{Mode, SwitchedPlant, TruePlant};
 use nalgebra::DMatrix;
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::{Rng, SeedableRng};
@@ -30,7 +30,7 @@ pub struct Drawn {
     /// The experiment.
     pub scenario: Scenario,
     /// The true plant.
-    pub truth: Truth,
+    pub truth: TruePlant,
     /// Largest relative error of an entry of `A`, `B` or `E`.
     pub model_error: f64,
     /// Noise, relative to the design's scenario.
@@ -192,10 +192,10 @@ fn disturbance(signal: &Waveform, draws: &mut Draws) -> Waveform {
 }
 
 /// Every entry of `A`, `B` and `E` off by a random part of `error`; a nonlinear plant stays what it is.
-fn truth(design: &Design, error: f64, draws: &mut Draws) -> Truth {
-    let nominal = match &design.truth {
-        Truth::AsDesigned => &design.controller.plant,
-        Truth::Linear { plant } => plant,
+fn truth(design: &Design, error: f64, draws: &mut Draws) -> TruePlant {
+    let nominal = match &design.true_plant {
+        TruePlant::AsDesigned => &design.controller.plant,
+        TruePlant::Linear { plant } => plant,
         other => return other.clone(),
     };
     let mut off = |matrix: &DMatrix<f64>| {
@@ -211,7 +211,7 @@ fn truth(design: &Design, error: f64, draws: &mut Draws) -> Truth {
             ..mode.clone()
         })
         .collect();
-    Truth::Linear {
+    TruePlant::Linear {
         plant: SwitchedPlant {
             sample_time: nominal.sample_time,
             modes,

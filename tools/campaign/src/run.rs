@@ -88,7 +88,7 @@ impl Struck {
 pub fn run_one(design: &Design, controller: &Controller, options: &Options, run: u64) -> Outcome {
     let drawn = draw(design, options, run);
     let mut detection = Detection::new(design, &drawn);
-    let plant = PlantSimulator::with_truth(
+    let plant = PlantSimulator::with_true_plant(
         design.controller.plant.clone(),
         drawn.truth.clone(),
         drawn.scenario.clone(),

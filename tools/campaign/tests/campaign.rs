@@ -6,7 +6,7 @@
 use campaign::{MergeError, Options, Partial, draw, merge, run_one, run_shard, shard};
 use ftc_control::Controller;
 use ftc_design::Design;
-use ftc_plant::Truth;
+use ftc_plant::TruePlant;
 use proptest::prelude::*;
 use std::path::Path;
 use std::sync::OnceLock;
@@ -154,7 +154,7 @@ fn what_is_drawn_stays_in_its_bounds() {
                     == std::mem::discriminant(&ftc_plant::scenario::FaultKind::Stuck),
             );
         }
-        let Truth::Linear { plant } = &drawn.truth else {
+        let TruePlant::Linear { plant } = &drawn.truth else {
             panic!("no linear plant")
         };
         let nominal = &design().controller.plant.modes[0].a;

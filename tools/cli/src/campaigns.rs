@@ -136,7 +136,7 @@ pub fn run(made: Made, arguments: &Arguments, quiet: bool) -> Result<String, Fai
 fn replay(mut made: Made, arguments: &Arguments, run: u64) -> Result<String, Failure> {
     let drawn = campaign::draw(&made.design, &arguments.options(), run);
     made.design.scenario = drawn.scenario;
-    made.design.truth = drawn.truth;
+    made.design.true_plant = drawn.truth;
     crate::simulate(made, &arguments.out, false)
 }
 

@@ -41,7 +41,7 @@ pub(crate) fn request(file: &DesignFile, folder: &Path, notes: &Notes) -> Result
     at("name", check::identifier(&file.name))?;
     let given = plant::read(file, folder, notes)?;
     let signals = signals(&file.signals, &given)?;
-    let truth = true_plant::truth(file, &given, folder)?;
+    let true_plant = true_plant::true_plant(file, &given, folder)?;
     let plant = given.plant;
     let dims = plant.dimensions();
     let disturbance = disturbance(file, dims)?;
@@ -77,7 +77,7 @@ pub(crate) fn request(file: &DesignFile, folder: &Path, notes: &Notes) -> Result
         name: file.name.clone(),
         signals,
         plant,
-        truth,
+        true_plant,
         control,
         bumpless: file.controller.bumpless.unwrap_or(defaults::BUMPLESS),
         feedforward: file.controller.feedforward.unwrap_or(defaults::FEEDFORWARD),

@@ -3,10 +3,10 @@
 use crate::assemble::at;
 use crate::check;
 use crate::plant::Found;
-use crate::schema::{self, DesignFile, PlantModel, TruePlant};
+use crate::schema::{self, DesignFile, PlantModel, TruePlant as Given};
 use crate::signal::{finite, interval};
 use ftc_plant::deviation::{LONGEST_DELAY, Load, Port, Told};
-use ftc_plant::{Deviation, Dimensions, Truth};
+use ftc_plant::{Deviation, Dimensions, TruePlant};
 use std::path::Path;
 
 /// Seed of relative errors, where none is given.
@@ -17,10 +17,10 @@ const SEED: u64 = 1;
 ///
 /// # Errors
 /// One sentence that names the key and what to do.
-pub(crate) fn truth(file: &DesignFile, found: &Found, folder: &Path) -> Result<Truth, String> {
+pub(crate) fn true_plant(file: &DesignFile, found: &Found, folder: &Path) -> Result<TruePlant, String> {
     let nominal = match &file.plant {
-        None => Truth::AsDesigned,
-        Some(PlantModel::Rectifier(rectifier)) => Truth::Rectifier(rectifier.clone()),
+        None => TruePlant::AsDesigned,
+        Some(PlantModel::Rectifier(rectifier)) => TruePlant::Rectifier(rectifier.clone()),
     };
     let Some(given) = &file.scenario.plant else {
         return Ok(nominal);
@@ -33,11 +33,11 @@ pub(crate) fn truth(file: &DesignFile, found: &Found, folder: &Path) -> Result<T
 /// Other matrices, and errors of all of them.
 fn motion(
     file: &DesignFile,
-    given: &TruePlant,
+    given: &Given,
     found: &Found,
     folder: &Path,
-    nominal: Truth,
-) -> Result<Truth, String> {
+    nominal: TruePlant,
+) -> Result<TruePlant, String> {
     let error = given.relative_error.unwrap_or(0.0);
     at("scenario.plant.relative_error", check::fraction(error))?;
     if given.modes.is_none() && error == 0.0 {
@@ -62,10 +62,10 @@ fn motion(
         })?;
         plant = plant.perturbed(error, seed);
     }
-    Ok(Truth::Linear { plant })
+    Ok(TruePlant::Linear { plant })
 }
 
-fn deviation(given: &TruePlant, found: &Found) -> Result<Deviation, String> {
+fn deviation(given: &Given, found: &Found) -> Result<Deviation, String> {
     let dims = found.plant.dimensions();
     let modes = found.plant.modes.len();
     let input_gain = match &given.input_gain {

@@ -5,7 +5,7 @@ use crate::text::significant;
 use ftc_control::Controller;
 use ftc_design::Design;
 use ftc_plant::deviation::{Load, Port};
-use ftc_plant::{Deviation, Truth};
+use ftc_plant::{Deviation, TruePlant};
 use ftc_simulate::closed_loop::visit;
 use ftc_simulate::{PlantSimulator, Variant};
 use serde_json::{Value, json};
@@ -37,7 +37,7 @@ pub fn cases(design: &Design) -> Vec<Case> {
     departures(design)
         .into_iter()
         .map(|(name, deviation)| {
-            let truth = design.truth.clone().with_deviation(deviation);
+            let truth = design.true_plant.clone().with_deviation(deviation);
             let errors = |variant| errors(design, &controller, truth.clone(), variant);
             Case {
                 name,
@@ -50,7 +50,7 @@ pub fn cases(design: &Design) -> Vec<Case> {
 
 /// What is tried, on top of what departs anyway.
 fn departures(design: &Design) -> Vec<(String, Deviation)> {
-    let (_, own) = design.truth.clone().into_parts();
+    let (_, own) = design.true_plant.clone().into_parts();
     let dims = design.controller.plant.dimensions();
     let mut all = vec![("the scenario as it is".to_string(), own.clone())];
     for (name, change) in [("10 % too strong", GAIN), ("10 % too weak", -GAIN)] {
@@ -102,8 +102,8 @@ fn height(design: &Design, channel: usize) -> f64 {
 }
 
 /// True mean square error per tracked output; infinite where the plant could not be integrated.
-fn errors(design: &Design, controller: &Controller, truth: Truth, variant: Variant) -> Vec<f64> {
-    let plant = PlantSimulator::with_truth(
+fn errors(design: &Design, controller: &Controller, truth: TruePlant, variant: Variant) -> Vec<f64> {
+    let plant = PlantSimulator::with_true_plant(
         design.controller.plant.clone(),
         truth,
         design.scenario.clone(),
