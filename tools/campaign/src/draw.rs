@@ -114,12 +114,12 @@ pub fn draw(design: &Design, options: &Options, run: u64) -> Drawn {
 
 /// Length of a run in seconds.
 fn length(design: &Design) -> f64 {
-    design.scenario.steps as f64 * design.controller.plant.sample_time
+    design.scenario.steps as f64 * design.plant.sample_time
 }
 
 /// Random modes, each for at least as long as the shortest in the design's own schedule.
 fn schedule(design: &Design, draws: &mut Draws) -> Vec<ModeInterval> {
-    let modes = design.controller.plant.modes.len() as u64;
+    let modes = design.plant.modes.len() as u64;
     let whole = length(design);
     let own = design.scenario.schedule.windows(2);
     let shortest = own
@@ -155,7 +155,7 @@ fn schedule(design: &Design, draws: &mut Draws) -> Vec<ModeInterval> {
 
 /// Random levels within what the scenario asks of this output, at random times.
 fn reference(design: &Design, index: usize, draws: &mut Draws) -> Waveform {
-    let te = design.controller.plant.sample_time;
+    let te = design.plant.sample_time;
     let signal = &design.scenario.reference[index];
     let levels = (0..design.scenario.steps).map(|tick| signal.at(tick, te));
     let [low, high] = levels.fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], value| {
@@ -194,7 +194,7 @@ fn disturbance(signal: &Waveform, draws: &mut Draws) -> Waveform {
 /// Every entry of `A`, `B` and `E` off by a random part of `error`; a nonlinear plant stays what it is.
 fn truth(design: &Design, error: f64, draws: &mut Draws) -> TruePlant {
     let nominal = match &design.true_plant {
-        TruePlant::AsDesigned => &design.controller.plant,
+        TruePlant::AsDesigned => &design.plant,
         TruePlant::Linear { plant } => plant,
         other => return other.clone(),
     };
@@ -220,7 +220,7 @@ fn truth(design: &Design, error: f64, draws: &mut Draws) -> TruePlant {
 }
 
 fn fault(design: &Design, options: &Options, draws: &mut Draws) -> FaultEvent {
-    let (whole, te) = (length(design), design.controller.plant.sample_time);
+    let (whole, te) = (length(design), design.plant.sample_time);
     let sensors = design.signals.outputs.len() as u64;
     let sensor = draws.below(sensors) as usize;
     let from = whole * draws.between(ONSET);

@@ -119,7 +119,8 @@ pub fn run_watched<E>(
     watch: &Watch,
     mut keep: impl FnMut(&[Outcome]) -> Result<(), E>,
 ) -> Result<Partial, E> {
-    let controller = Controller::new(design.controller.clone());
+    let controller =
+        Controller::new(design.parameters()).expect("a finished design has matching sizes");
     let mut partial = Partial::new(design, options);
     let mut first = range.start;
     while first < range.end && !watch.stop.load(Ordering::Relaxed) {

@@ -89,7 +89,7 @@ pub fn run_one(design: &Design, controller: &Controller, options: &Options, run:
     let drawn = draw(design, options, run);
     let mut detection = Detection::new(design, &drawn);
     let plant = PlantSimulator::with_true_plant(
-        design.controller.plant.clone(),
+        design.plant.clone(),
         drawn.truth.clone(),
         drawn.scenario.clone(),
     );
@@ -135,7 +135,7 @@ struct Detection {
 impl Detection {
     fn new(design: &Design, drawn: &Drawn) -> Self {
         let sensors = design.signals.outputs.len();
-        let te = design.controller.plant.sample_time;
+        let te = design.plant.sample_time;
         let events = drawn.scenario.events.iter();
         let mut faults: Vec<Struck> = events.map(|event| Struck::new(event, te)).collect();
         for at in 0..faults.len() {

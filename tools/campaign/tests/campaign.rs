@@ -98,7 +98,7 @@ fn shards_cover_every_run_once() {
 fn statistics_are_those_of_the_runs() {
     let (options, controller) = (
         Options::default(),
-        Controller::new(design().controller.clone()),
+        Controller::new(design().parameters()).unwrap(),
     );
     let outcomes: Vec<_> = (0..40)
         .map(|run| run_one(design(), &controller, &options, run))
@@ -157,7 +157,7 @@ fn what_is_drawn_stays_in_its_bounds() {
         let TruePlant::Linear { plant } = &drawn.truth else {
             panic!("no linear plant")
         };
-        let nominal = &design().controller.plant.modes[0].a;
+        let nominal = &design().plant.modes[0].a;
         let off = (&plant.modes[0].a - nominal).component_div(nominal);
         assert!(off.amax() <= options.model_error);
         let schedule = &drawn.scenario.schedule;
@@ -184,7 +184,7 @@ fn the_page_and_the_json_hold_the_numbers() {
 
 #[test]
 fn rows_are_a_parquet_file() {
-    let controller = Controller::new(design().controller.clone());
+    let controller = Controller::new(design().parameters()).unwrap();
     let outcomes: Vec<_> = (0..3)
         .map(|run| run_one(design(), &controller, &Options::default(), run))
         .collect();

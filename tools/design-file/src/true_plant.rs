@@ -17,7 +17,11 @@ const SEED: u64 = 1;
 ///
 /// # Errors
 /// One sentence that names the key and what to do.
-pub(crate) fn true_plant(file: &DesignFile, found: &Found, folder: &Path) -> Result<TruePlant, String> {
+pub(crate) fn true_plant(
+    file: &DesignFile,
+    found: &Found,
+    folder: &Path,
+) -> Result<TruePlant, String> {
     let nominal = match &file.plant {
         None => TruePlant::AsDesigned,
         Some(PlantModel::Rectifier(rectifier)) => TruePlant::Rectifier(rectifier.clone()),

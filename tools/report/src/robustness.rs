@@ -33,7 +33,8 @@ pub struct Case {
 /// Tries the scenario as it is, actuators that are too strong and too weak, a step on each input and
 /// each disturbance in the middle of the scenario, and readings that are one sample later.
 pub fn cases(design: &Design) -> Vec<Case> {
-    let controller = Controller::new(design.controller.clone());
+    let controller =
+        Controller::new(design.parameters()).expect("a finished design has matching sizes");
     departures(design)
         .into_iter()
         .map(|(name, deviation)| {
@@ -51,7 +52,7 @@ pub fn cases(design: &Design) -> Vec<Case> {
 /// What is tried, on top of what departs anyway.
 fn departures(design: &Design) -> Vec<(String, Deviation)> {
     let (_, own) = design.true_plant.clone().into_parts();
-    let dims = design.controller.plant.dimensions();
+    let dims = design.plant.dimensions();
     let mut all = vec![("the scenario as it is".to_string(), own.clone())];
     for (name, change) in [("10 % too strong", GAIN), ("10 % too weak", -GAIN)] {
         let mut deviation = own.clone();
@@ -61,7 +62,7 @@ fn departures(design: &Design) -> Vec<(String, Deviation)> {
         }
         all.push((format!("every actuator {name}"), deviation));
     }
-    let middle = (design.scenario.steps / 2) as f64 * design.controller.plant.sample_time;
+    let middle = (design.scenario.steps / 2) as f64 * design.plant.sample_time;
     let mut step = |name: String, at: Port, size: f64| {
         let mut deviation = own.clone();
         deviation.loads.push(Load {
@@ -94,7 +95,7 @@ fn departures(design: &Design) -> Vec<(String, Deviation)> {
 
 /// The largest value of a disturbance in the scenario, or one.
 fn height(design: &Design, channel: usize) -> f64 {
-    let te = design.controller.plant.sample_time;
+    let te = design.plant.sample_time;
     let signal = &design.scenario.disturbance[channel];
     let values = (0..design.scenario.steps).map(|tick| signal.at(tick, te).abs());
     let largest = values.fold(0.0, f64::max);
@@ -102,12 +103,14 @@ fn height(design: &Design, channel: usize) -> f64 {
 }
 
 /// True mean square error per tracked output; infinite where the plant could not be integrated.
-fn errors(design: &Design, controller: &Controller, truth: TruePlant, variant: Variant) -> Vec<f64> {
-    let plant = PlantSimulator::with_true_plant(
-        design.controller.plant.clone(),
-        truth,
-        design.scenario.clone(),
-    );
+fn errors(
+    design: &Design,
+    controller: &Controller,
+    truth: TruePlant,
+    variant: Variant,
+) -> Vec<f64> {
+    let plant =
+        PlantSimulator::with_true_plant(design.plant.clone(), truth, design.scenario.clone());
     let tracked = &design.controller.feedback.tracked;
     let mut squares = vec![0.0; tracked.len()];
     let stalled = visit(&plant, controller, variant, |seen| {
