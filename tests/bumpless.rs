@@ -11,7 +11,7 @@ use ftc_design::{
     ControlSpec, Design, Lyapunov, Objective, ObserverChoice, ObserverSpec, Signal, Signals,
 };
 use ftc_plant::scenario::{ModeInterval, Waveform};
-use ftc_plant::{Mode, OperatingPoint, Scenario, SwitchedPlant, Truth};
+use ftc_plant::{Mode, OperatingPoint, Scenario, SwitchedPlant, TruePlant};
 use nalgebra::{DMatrix, DVector};
 
 fn single(value: f64) -> DMatrix<f64> {
@@ -53,7 +53,7 @@ fn request(lyapunov: Lyapunov, bumpless: bool) -> Request {
             states: signals("x"),
         },
         plant: plant(),
-        truth: Truth::AsDesigned,
+        true_plant: TruePlant::AsDesigned,
         control: ControlSpec {
             tracked: vec![0],
             latency: 0,
@@ -100,8 +100,8 @@ fn request(lyapunov: Lyapunov, bumpless: bool) -> Request {
 /// The largest output and the largest jumps of the command at switches that may and may not be smooth,
 /// when the mode changes every `period` samples.
 fn run(design: &Design, period: usize) -> (f64, f64) {
-    let controller = Controller::new(design.controller.clone());
-    let modes = &design.controller.plant.modes;
+    let controller = Controller::new(design.parameters()).unwrap();
+    let modes = &design.plant.modes;
     let mut state = controller.initial_state(0);
     let mut x = DVector::from_element(1, 0.0);
     let (mut largest, mut jump, mut before) = (0.0_f64, 0.0_f64, 0.0);
@@ -158,7 +158,7 @@ fn switches_far_enough_apart_leave_the_command_where_it_was() {
 fn resets_more_often_than_proved_are_refused() {
     let design = assemble(request(Lyapunov::Common, true)).unwrap();
     ftc_design::coverage::check(&design).unwrap();
-    let plant = &design.controller.plant;
+    let plant = &design.plant;
     design.synthesis.as_ref().unwrap().verify(plant).unwrap();
 
     let mut hasty = design.clone();

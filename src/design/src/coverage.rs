@@ -246,8 +246,7 @@ fn plausible(predictor: &ftc_control::parameters::Predictor) -> bool {
 fn transfers_fit(design: &Design, estimator: &Estimator) -> bool {
     let derived = match &estimator.harmonics {
         Some(known) if known.period > 0.0 && known.count > 0 && known.count < 100 => {
-            let plant = &design.plant;
-            harmonics::transfers(plant, known.period * plant.sample_time, known.count)
+            harmonics::transfers(&design.plant, known.period, known.count)
         }
         Some(_) => return false,
         None => Vec::new(),

@@ -194,7 +194,7 @@ fn a_unit_that_underflows_is_refused() {
             change(design.synthesis.as_mut().unwrap());
             assert!(proves(&design).is_err());
             let synthesis = design.synthesis.unwrap();
-            let error = synthesis.verify(&original.controller.plant).unwrap_err();
+            let error = synthesis.verify(&original.plant).unwrap_err();
             assert!(error.to_string().contains("units"), "{error}");
         };
         refused(&|synthesis| synthesis.state_feedback.certificate.units.inputs[0] = unit);
