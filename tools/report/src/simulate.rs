@@ -42,10 +42,10 @@ pub fn simulate(
         bound = Some(comparison::bound(design, &trajectories[0]));
     }
     warnings.extend(warnings::of_runs(design, &trajectories));
-    let cases = robustness::cases(design);
-    warnings.extend(robustness::warnings(design, &cases));
     let csv = table(design, &trajectories).map_err(|error| error.to_string())?;
     let metrics = metrics(design, &trajectories, bound.as_deref(), &warnings);
+    let cases = robustness::cases(design);
+    warnings.extend(robustness::warnings(design, &cases));
     let tried = format!("{:#}\n", robustness::json(&cases));
     let mut files = vec![
         ("trajectories.csv".to_string(), csv),

@@ -135,6 +135,9 @@ fn units(scaling: &Scaling) -> OwnedUnits {
     }
 }
 
+/// Beyond it a magnitude is printed as 1.0000, which no observer decay can exceed.
+const LARGEST_PRINTED: f64 = 0.999_95;
+
 /// The error dynamics in per-unit: `T_ij A_i` for every pair, `C_i` for every mode.
 struct ErrorModel {
     projected: Vec<Vec<DMatrix<f64>>>,
@@ -160,10 +163,8 @@ impl ErrorModel {
         for (i, j) in spec.lyapunov.observer_pairs(self.outputs.len()) {
             let found = check_detectable(&self.projected[i][j], &self.outputs[i], spec.decay);
             if let Err(magnitude) = found {
-                // What is printed has to be reachable: an eigenvalue just below 1 is none that decays.
-                let printed = (1e4 * magnitude).ceil() / 1e4;
-                let reason = match printed < 1.0 {
-                    true => format!("ask for an observer decay above {printed:.4}"),
+                let reason = match magnitude < LARGEST_PRINTED {
+                    true => format!("ask for an observer decay above {magnitude:.4}"),
                     false => "use a luenberger observer or more sensors".into(),
                 };
                 return Err(DesignError::Request(format!(
