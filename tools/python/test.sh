@@ -26,7 +26,7 @@ done
 python -m pytest -c tools/python/pytest.ini --rootdir tools/python
 python tools/python/readme.py README.md "$folder/readme"
 for example in quadruple_tank dc_motor boost_converter; do
-    python "examples/python/$example.py" --out "$folder/$example"
+    python "examples/python/$example.py" --out "$folder/$example" --runs 100
 done
 python examples/python/from_a_log.py --out "$folder/from_a_log"
 FTC_FMU=$PWD/$environment/bin/ftc-fmu python -m pytest tests
