@@ -11,7 +11,7 @@ mkdir -p "$folder"
 "${PYTHON:-python3}" -m venv "$environment"
 wheel=$(ls -t dist/ftc_fmu-*manylinux*x86_64.whl | head -1)
 "$environment/bin/pip" install --quiet --disable-pip-version-check "${wheel}[all]" --constraint tests/requirements.txt \
-    --requirement tests/requirements.txt
+    --constraint tools/python/tests/requirements.txt --requirement tests/requirements.txt
 
 # No cargo, no rustc: what is tested is what a user has.
 PATH=$PWD/$environment/bin:/usr/local/bin:/usr/bin:/bin

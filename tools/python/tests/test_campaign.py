@@ -1,4 +1,7 @@
-"""Campaigns: the same to the last digit however they are divided, and whoever dies."""
+"""Campaigns: the same to the last digit however they are divided, and whoever dies.
+
+promise: dask
+"""
 
 from __future__ import annotations
 
