@@ -131,7 +131,7 @@ def _on_cluster(
             index = futures[future]
             try:
                 parts[index] = future.result()
-            except (distributed.KilledWorker, distributed.scheduler.KilledWorker) as error:
+            except distributed.KilledWorker as error:
                 # The scheduler gives a task up after a few deaths; they were not this task's doing.
                 tries[index] += 1
                 if tries[index] > RETRIES:
