@@ -98,7 +98,7 @@ def channels(design: dict, index: int, lost: dict | None = None, *, exact: bool 
     """
     numbers = rationals if exact else _floats
     controller = design["controller"]
-    plant, feedback, observer = controller["plant"], controller["feedback"], controller["observer"]
+    plant, feedback, observer = design["plant"], controller["feedback"], controller["observer"]
     mode, gains = plant["modes"][index], feedback["modes"][index]
     A, B, C = (numbers(mode[key]) for key in "abc")
     E, F = map(numbers, disturbance_of(plant["modes"], mode))
