@@ -1,6 +1,30 @@
 //! Off line: gains, observers, predictor and certificate.
 //!
-//! The data types and the certificate need no solver; making gains does (feature `design`).
+//! The data types and the certificate need no solver; making gains does (feature `solver`, on by
+//! default). The solver links eight symbols of a BLAS and LAPACK: leave the feature `lapack` off in a
+//! program that links one, switch it on in a program that does not.
+//!
+//! ```
+//! use ftc_design::{ControlSpec, state_feedback};
+//! use ftc_plant::{Mode, OperatingPoint, SwitchedPlant, scaling::Scaling};
+//! use nalgebra::dmatrix;
+//!
+//! let mode = |pole: f64| Mode {
+//!     name: "mode".into(),
+//!     a: dmatrix![pole, 0.1; 0.0, 0.5],
+//!     b: dmatrix![0.0; 1.0],
+//!     c: dmatrix![1.0, 0.0],
+//!     e: dmatrix![0.1; 0.0],
+//!     f: dmatrix![0.0],
+//!     operating_point: OperatingPoint::zero(2, 1, 1),
+//! };
+//! let plant = SwitchedPlant { sample_time: 1.0, modes: vec![mode(0.9), mode(0.8)] };
+//! let spec = ControlSpec { decay: 0.98, ..ControlSpec::new(plant.dimensions()) };
+//! let control = state_feedback::synthesise(&plant, &spec, &Scaling::automatic(&plant))?;
+//! control.verify(&plant)?; // from the very doubles, without the solver
+//! assert!(control.spectral_radius.iter().all(|&radius| radius < 0.98));
+//! # Ok::<(), ftc_design::DesignError>(())
+//! ```
 
 #[cfg(feature = "solver")]
 pub mod as_printed;

@@ -35,7 +35,7 @@ fn fortran(size: usize) -> c_int {
 ///
 /// # Safety
 /// The pointers are valid for an n x n matrix with leading dimension `lda`.
-#[unsafe(no_mangle)]
+#[cfg_attr(feature = "symbols", unsafe(no_mangle))]
 pub unsafe extern "C" fn dpotrf_(
     uplo: *const c_char,
     n: *const c_int,
@@ -91,7 +91,7 @@ fn upper_cholesky(a: &mut DMatrix<f64>) -> Info {
 ///
 /// # Safety
 /// The pointers are valid for the shapes the sizes and leading dimensions describe.
-#[unsafe(no_mangle)]
+#[cfg_attr(feature = "symbols", unsafe(no_mangle))]
 pub unsafe extern "C" fn dpotrs_(
     uplo: *const c_char,
     n: *const c_int,
@@ -146,7 +146,7 @@ unsafe fn potrs(
 /// # Safety
 /// The pointers are valid for the shapes the sizes and leading dimensions describe; `z` is not
 /// touched unless `jobz = V`.
-#[unsafe(no_mangle)]
+#[cfg_attr(feature = "symbols", unsafe(no_mangle))]
 pub unsafe extern "C" fn dsyevr_(
     jobz: *const c_char,
     range: *const c_char,
@@ -262,7 +262,7 @@ fn eigen(a: DMatrix<f64>, vectors: bool) -> Result<(Vec<f64>, Option<DMatrix<f64
 /// # Safety
 /// The pointers are valid for the shapes the sizes and leading dimensions describe; `u` and `vt`
 /// are not touched unless `jobz = S`.
-#[unsafe(no_mangle)]
+#[cfg_attr(feature = "symbols", unsafe(no_mangle))]
 pub unsafe extern "C" fn dgesdd_(
     jobz: *const c_char,
     m: *const c_int,
@@ -303,7 +303,7 @@ pub unsafe extern "C" fn dgesdd_(
 ///
 /// # Safety
 /// As for [`dgesdd_`].
-#[unsafe(no_mangle)]
+#[cfg_attr(feature = "symbols", unsafe(no_mangle))]
 pub unsafe extern "C" fn dgesvd_(
     jobu: *const c_char,
     jobvt: *const c_char,

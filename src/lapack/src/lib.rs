@@ -2,7 +2,9 @@
 //!
 //! A conic solver with semidefinite cones expects `dgemm_`, `dsyrk_`, `dsyr2k_`, `dpotrf_`,
 //! `dpotrs_`, `dsyevr_`, `dgesdd_` and `dgesvd_` from a system BLAS. This crate defines them, so
-//! that no system package is needed. A dependent keeps them linked with `use ftc_lapack as _;`.
+//! that no system package is needed. The feature `symbols` gives them these names for the linker; a dependent
+//! keeps them linked with `use ftc_lapack as _;`. Without the feature they are plain functions, and the
+//! program may link any other BLAS.
 //!
 //! The conventions are Fortran's: every argument is a pointer, matrices are column-major with a
 //! leading dimension, `info` is 0 on success, `-i` when argument `i` is illegal and positive when

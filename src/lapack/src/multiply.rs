@@ -35,7 +35,7 @@ fn accumulate(
 /// # Safety
 /// The pointers are valid for the shapes the sizes and leading dimensions describe, and `c`
 /// overlaps neither `a` nor `b`.
-#[unsafe(no_mangle)]
+#[cfg_attr(feature = "symbols", unsafe(no_mangle))]
 pub unsafe extern "C" fn dgemm_(
     transa: *const c_char,
     transb: *const c_char,
@@ -116,7 +116,7 @@ fn add_to_triangle(
 ///
 /// # Safety
 /// As for [`dgemm_`].
-#[unsafe(no_mangle)]
+#[cfg_attr(feature = "symbols", unsafe(no_mangle))]
 pub unsafe extern "C" fn dsyrk_(
     uplo: *const c_char,
     trans: *const c_char,
@@ -137,7 +137,7 @@ pub unsafe extern "C" fn dsyrk_(
 ///
 /// # Safety
 /// As for [`dgemm_`].
-#[unsafe(no_mangle)]
+#[cfg_attr(feature = "symbols", unsafe(no_mangle))]
 pub unsafe extern "C" fn dsyr2k_(
     uplo: *const c_char,
     trans: *const c_char,

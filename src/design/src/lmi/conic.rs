@@ -8,6 +8,7 @@ use clarabel::solver::{
     DefaultSettings, DefaultSolver, IPSolver, SolverStatus, SupportedConeT,
     SupportedConeT::{NonnegativeConeT, PSDTriangleConeT, ZeroConeT},
 };
+#[cfg(feature = "lapack")]
 use ftc_lapack as _;
 use std::collections::BTreeMap;
 use std::f64::consts::SQRT_2;
