@@ -176,6 +176,7 @@ pub fn controller(channel: Channel, noise: f64) -> ControllerParameters {
         },
         estimator: Estimator {
             method: EstimatorMethod::Reference,
+            hypotheses: None,
             response_length: length,
             window: 2 * (length + 1) + 20,
             predictors,

@@ -5,7 +5,9 @@ use ftc_control::parameters::{Compensation, EstimatorMethod};
 use ftc_design::assembly::{
     DatabaseSource, EstimatorSpec, KnownDisturbance, Request, Threshold, assemble,
 };
-use ftc_design::{ControlSpec, Design, Lyapunov, ObserverChoice, ObserverSpec, Signal, Signals};
+use ftc_design::{
+    ControlSpec, Design, HypothesesSpec, Lyapunov, ObserverChoice, ObserverSpec, Signal, Signals,
+};
 use ftc_plant::Scenario;
 use ftc_plant::scenario::{ModeInterval, Waveform};
 use ftc_plant::{Mode, OperatingPoint, SwitchedPlant, spectral_radius};
@@ -131,6 +133,7 @@ pub fn design(dice: &mut Dice) -> Design {
                 debounce: 1,
                 stuck_after: 0,
                 adapt: false,
+                hypotheses: HypothesesSpec::default(),
                 disturbance: Some(KnownDisturbance {
                     period,
                     harmonics: 1,

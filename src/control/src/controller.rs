@@ -5,12 +5,15 @@ mod derivative;
 pub use derivative::Change;
 
 use super::compensation::{self, AdditiveControl};
+use super::estimator::hypotheses::{Bank, BankState};
 use super::estimator::{EstimatorState, Observation};
 use super::integrator;
 use super::kernel;
 use super::observer::{ObservedMode, ObserverState};
 use super::open_loop::OpenLoop;
-use super::parameters::{Compensation, ControllerParameters, FeedbackGains, Limits};
+use super::parameters::{
+    Compensation, ControllerParameters, EstimatorMethod, FeedbackGains, Limits,
+};
 use super::repetition::Repetition;
 use crate::state::State;
 use ftc_plant::OperatingPoint;
@@ -21,6 +24,8 @@ use serde::{Deserialize, Serialize};
 pub struct Controller {
     parameters: ControllerParameters,
     modes: Vec<ObservedMode>,
+    /// The state-based estimator, where it is chosen.
+    bank: Option<Bank>,
 }
 
 /// What a tick is told.
@@ -64,6 +69,8 @@ pub struct ControllerState {
     open_loop: OpenLoop,
     /// Fault estimator.
     pub estimator: EstimatorState,
+    /// The state-based estimator, where it is chosen.
+    pub bank: Option<BankState>,
     /// Integrator state `Z` and resonators (q).
     pub integral: Vec<f64>,
     /// The printed additive control, where it is chosen.
@@ -86,8 +93,8 @@ pub struct ControllerState {
 
 crate::state!(ControllerState {
     parts: [
-        repetition, observer, open_loop, estimator, integral, additive, command, corrected, acting,
-        deviation, excess, substitute, no_fault
+        repetition, observer, open_loop, estimator, bank, integral, additive, command, corrected,
+        acting, deviation, excess, substitute, no_fault
     ],
     constants: [],
     counters: [mode]
@@ -108,7 +115,20 @@ impl Controller {
                 output_offset: mode.output_offset().iter().copied().collect(),
             })
             .collect();
-        Self { parameters, modes }
+        let bank = match (
+            parameters.estimator.method,
+            &parameters.estimator.hypotheses,
+        ) {
+            (EstimatorMethod::Observer, Some(settings)) => {
+                Some(Bank::new(&parameters.plant, settings))
+            }
+            _ => None,
+        };
+        Self {
+            parameters,
+            modes,
+            bank,
+        }
     }
 
     /// What this controller was built from.
@@ -127,6 +147,7 @@ impl Controller {
             observer: ObserverState::new(&point.x, dims.outputs),
             open_loop: OpenLoop::new(&point.x, dims.outputs),
             estimator: EstimatorState::new(&self.parameters.estimator, &point.u, dims.outputs),
+            bank: self.bank.as_ref().map(|bank| bank.start(mode)),
             integral: vec![0.0; self.parameters.feedback.integral_size()],
             additive: (self.parameters.compensation == Compensation::Additive)
                 .then(|| AdditiveControl::new(tracked, dims.inputs)),
@@ -151,19 +172,23 @@ impl Controller {
         let point = &described.operating_point;
         let left = self.enter(state, mode, sample.thresholds);
         let settings = &self.parameters.estimator;
-        state.estimator.observe(
-            settings,
-            &Observation {
+        let readings = state
+            .repetition
+            .screen(sample.measurement, settings.stuck_after);
+        if let (Some(bank), Some(judged)) = (&self.bank, &mut state.bank) {
+            bank.observe(judged, mode, readings, sample.thresholds);
+            state.estimator.adopt(settings, judged, readings);
+        } else {
+            let seen = Observation {
                 tick: sample.tick,
                 mode,
                 u0: &point.u,
                 y0: &point.y,
-                y: state
-                    .repetition
-                    .screen(sample.measurement, settings.stuck_after),
+                y: readings,
                 thresholds: sample.thresholds,
-            },
-        );
+            };
+            state.estimator.observe(settings, &seen);
+        }
         self.correct_measurement(state, model, sample);
         state.observer.correct(
             &self.parameters.observer,
@@ -181,7 +206,8 @@ impl Controller {
 
     /// Whether a state has the sizes of this controller; one that came as bytes may not.
     pub fn fits(&self, state: &ControllerState) -> bool {
-        state.same_shape(&self.initial_state(0))
+        let sound = state.bank.as_ref().is_none_or(BankState::sound);
+        sound && state.same_shape(&self.initial_state(0))
     }
 
     /// Notes the mode and returns the one just left.
@@ -351,7 +377,11 @@ impl Controller {
                 &state.excess,
             );
         }
-        state.estimator.remember(&state.acting);
+        if let (Some(bank), Some(judged)) = (&self.bank, &mut state.bank) {
+            bank.advance(judged, &state.acting);
+        } else {
+            state.estimator.remember(&state.acting);
+        }
     }
 }
 

@@ -1,7 +1,7 @@
 //! Everything the controller needs to know before its first tick: plain, serialisable data.
 
-use ftc_plant::SwitchedPlant;
 use ftc_plant::rows;
+use ftc_plant::{Dimensions, SwitchedPlant};
 use nalgebra::DMatrix;
 use serde::{Deserialize, Serialize};
 
@@ -147,6 +147,8 @@ pub struct Gain(#[serde(with = "rows")] pub DMatrix<f64>);
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum EstimatorMethod {
+    /// State-based: hypotheses about sensors and plant in competition.
+    Observer,
     /// Least-squares predictor from a healthy database (55)-(60).
     Reference,
     /// The sliding window as printed (44).
@@ -160,6 +162,9 @@ pub enum EstimatorMethod {
 pub struct Estimator {
     /// Method.
     pub method: EstimatorMethod,
+    /// Sizes and rates for [`EstimatorMethod::Observer`].
+    #[serde(default)]
+    pub hypotheses: Option<Hypotheses>,
     /// `j`: how many past inputs the output remembers.
     pub response_length: usize,
     /// `L`: samples in the window of [`EstimatorMethod::Sliding`], more than `m j`.
@@ -185,6 +190,160 @@ pub struct Estimator {
     pub leverage_limit: f64,
     /// Largest magnitude an estimate may take, per sensor (p).
     pub largest_fault: Vec<f64>,
+}
+
+/// What is done about a divergence that could be a sensor's drift or a load.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Ambiguous {
+    /// The sensors are believed, and the alarm is up.
+    TrustSensors,
+    /// The model is believed: the sensor is corrected.
+    TrustModel,
+}
+
+/// Sizes and rates of what may happen to sensors and plant, for [`EstimatorMethod::Observer`].
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Hypotheses {
+    /// Faults per sample and sensor.
+    pub fault_rate: f64,
+    /// Freezes per sample and sensor.
+    pub stuck_rate: f64,
+    /// Ends of a fault per sample: one over its mean length.
+    pub release_rate: f64,
+    /// Jumps of a present fault per sample.
+    pub change_rate: f64,
+    /// Jumps of loads or of input gains per sample.
+    pub load_rate: f64,
+    /// Probability that a load that moves goes on moving in the next sample.
+    pub load_moving: f64,
+    /// What a sample costs at most while loads move, in log likelihood.
+    pub surprise: f64,
+    /// Log odds that an accusation must have against the best explanation without one.
+    pub odds: f64,
+    /// Standard deviation of a new fault (p), output units.
+    pub fault_size: Vec<f64>,
+    /// How far a fault that came abruptly wanders per sample, in noise deviations.
+    pub fault_walk: f64,
+    /// The same for a fault that grew slowly.
+    pub drift_walk: f64,
+    /// Standard deviation of a load on each input (m), input units.
+    pub input_load: Vec<f64>,
+    /// Standard deviation of a load on each disturbance channel (s), its units.
+    pub disturbance_load: Vec<f64>,
+    /// How far a load on the states themselves displaces them at rest (n), state units.
+    pub state_load: Vec<f64>,
+    /// How far a load wanders per sample, relative to the size of its jumps.
+    pub load_walk: f64,
+    /// Relative error of the entries of the plant's matrices.
+    pub model_error: f64,
+    /// Standard deviation of the relative error of an input's gain.
+    pub gain_error: f64,
+    /// How far an input's gain wanders per sample.
+    pub gain_walk: f64,
+    /// Relative error of the disturbance's period.
+    pub period_error: f64,
+    /// Standard deviation of each state of the disturbance (2 x harmonics x s).
+    pub disturbance_size: Vec<f64>,
+    /// Angle per sample of each harmonic, in radians; empty without a known period.
+    pub angles: Vec<f64>,
+    /// Typical deviation of each state from its operating point (n).
+    pub state_size: Vec<f64>,
+    /// Standard deviation of the state at the start (n).
+    pub start: Vec<f64>,
+    /// The same where the plant was not at rest (n).
+    pub start_elsewhere: Vec<f64>,
+    /// Largest correction of each sensor (p), output units.
+    pub authority: Vec<f64>,
+    /// What is done about a slow divergence.
+    pub ambiguous: Ambiguous,
+}
+
+impl Estimator {
+    /// Whether what the method needs is there and fits a plant of size `dims`.
+    ///
+    /// # Errors
+    /// One sentence that names what does not.
+    pub fn check(&self, dims: Dimensions) -> Result<(), String> {
+        match (self.method, &self.hypotheses) {
+            (EstimatorMethod::Observer, Some(settings)) => settings.check(dims),
+            (EstimatorMethod::Observer, None) => Err(
+                "the design's estimator is state-based, but its sizes and rates are missing".into(),
+            ),
+            _ => Ok(()),
+        }
+    }
+}
+
+impl Hypotheses {
+    /// Whether sizes and rates fit a plant of size `dims`.
+    ///
+    /// # Errors
+    /// One sentence that names the first that does not.
+    pub fn check(&self, dims: Dimensions) -> Result<(), String> {
+        let waves = 2 * self.angles.len() * dims.disturbances;
+        for (what, values, needed) in [
+            ("fault_size", &self.fault_size, dims.outputs),
+            ("authority", &self.authority, dims.outputs),
+            ("input_load", &self.input_load, dims.inputs),
+            (
+                "disturbance_load",
+                &self.disturbance_load,
+                dims.disturbances,
+            ),
+            ("disturbance_size", &self.disturbance_size, waves),
+            ("state_load", &self.state_load, dims.states),
+            ("state_size", &self.state_size, dims.states),
+            ("start", &self.start, dims.states),
+            ("start_elsewhere", &self.start_elsewhere, dims.states),
+        ] {
+            let sensible = values.iter().all(|value| (0.0..=1e50).contains(value));
+            if values.len() != needed || !sensible {
+                return Err(format!(
+                    "the estimator's {what} must be {needed} numbers from 0 to 1e50"
+                ));
+            }
+        }
+        for (what, rate) in [
+            ("fault_rate", self.fault_rate),
+            ("stuck_rate", self.stuck_rate),
+            ("release_rate", self.release_rate),
+            ("change_rate", self.change_rate),
+            ("load_rate", self.load_rate),
+            ("load_moving", self.load_moving),
+        ] {
+            if !(1e-100..=0.999).contains(&rate) {
+                return Err(format!(
+                    "the estimator's {what} must lie between 1e-100 and 0.999"
+                ));
+            }
+        }
+        let others = [
+            self.surprise,
+            self.odds,
+            self.fault_walk,
+            self.drift_walk,
+            self.load_walk,
+            self.model_error,
+            self.gain_error,
+            self.gain_walk,
+            self.period_error,
+        ];
+        let sensible = others
+            .iter()
+            .chain(&self.angles)
+            .all(|value| (0.0..=1e6).contains(value));
+        if sensible {
+            Ok(())
+        } else {
+            Err("the estimator's sizes must lie between 0 and 1e6".into())
+        }
+    }
+
+    /// Whether a slow divergence is taken for a sensor's fault.
+    pub fn trusts_model(&self) -> bool {
+        self.ambiguous == Ambiguous::TrustModel
+    }
 }
 
 /// `y ~ y0 + response * phi`, with `phi` the last `j` inputs relative to `u0`, oldest first.

@@ -2,6 +2,7 @@
 
 use super::commissioning::{self, Database, LONGEST_RESPONSE, RecordedDisturbance};
 use super::harmonics;
+use super::hypotheses::{self, HypothesesSpec};
 use super::{
     ControlSpec, Design, DesignError, FORMAT, ObserverSpec, Signal, Signals, check_controllable,
     synthesise,
@@ -60,6 +61,8 @@ pub struct EstimatorSpec {
     pub adapt: bool,
     /// The periodic disturbance to be learned on line.
     pub disturbance: Option<KnownDisturbance>,
+    /// What is asked of the state-based method.
+    pub hypotheses: HypothesesSpec,
 }
 
 /// Where the healthy database comes from.
@@ -231,12 +234,12 @@ fn estimator(request: &Request, dims: Dimensions) -> Result<Estimator, String> {
     let spec = &request.estimator;
     let outputs = &request.signals.outputs;
     let response_length = match spec.method {
-        EstimatorMethod::None => 0,
+        EstimatorMethod::Observer | EstimatorMethod::None => 0,
         EstimatorMethod::Reference | EstimatorMethod::Sliding => response_length(request, dims)?,
     };
     let predictors = match spec.method {
         EstimatorMethod::Reference => predictors(request, response_length)?,
-        EstimatorMethod::None | EstimatorMethod::Sliding => Vec::new(),
+        EstimatorMethod::Observer | EstimatorMethod::None | EstimatorMethod::Sliding => Vec::new(),
     };
     let thresholds = thresholds(
         &spec.threshold,
@@ -244,15 +247,23 @@ fn estimator(request: &Request, dims: Dimensions) -> Result<Estimator, String> {
         &request.scenario.noise,
         outputs,
     );
+    let state_based = spec.method == EstimatorMethod::Observer;
     let harmonics = spec
         .disturbance
         .as_ref()
+        .filter(|_| !state_based)
         .map(|known| known_harmonics(known, &request.plant, &thresholds));
     let harmonic_transfers = harmonics.as_ref().map_or_else(Vec::new, |known| {
         harmonics::transfers(&request.plant, known.period, known.count)
     });
+    let hypotheses = state_based.then(|| hypotheses::settings(request));
+    let largest_fault = hypotheses.as_ref().map_or_else(
+        || outputs.iter().map(largest_fault).collect(),
+        |settings| settings.authority.clone(),
+    );
     Ok(Estimator {
         method: spec.method,
+        hypotheses,
         response_length,
         window: dims.inputs * (response_length + 1) + WINDOW_MARGIN,
         predictors,
@@ -263,7 +274,7 @@ fn estimator(request: &Request, dims: Dimensions) -> Result<Estimator, String> {
         debounce: spec.debounce,
         stuck_after: spec.stuck_after,
         leverage_limit: LEVERAGE_LIMIT,
-        largest_fault: outputs.iter().map(largest_fault).collect(),
+        largest_fault,
     })
 }
 

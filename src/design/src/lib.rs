@@ -14,6 +14,8 @@ mod controllability;
 mod feedforward;
 pub mod harmonics;
 #[cfg(feature = "solver")]
+mod hypotheses;
+#[cfg(feature = "solver")]
 pub mod lmi;
 mod lyapunov;
 pub mod observer;
@@ -32,6 +34,8 @@ use serde::{Deserialize, Serialize};
 
 pub use certificate::{CertificateError, ControlCertificate};
 pub use controllability::check_controllable;
+#[cfg(feature = "solver")]
+pub use hypotheses::HypothesesSpec;
 pub use lyapunov::{DwellTime, Lyapunov};
 pub use observer::{LostCertificate, ObserverCertificate, ObserverDesign};
 pub use record::{Design, FORMAT, Signal, Signals};

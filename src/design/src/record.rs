@@ -76,7 +76,7 @@ impl Design {
         let tracked = &self.controller.feedback.tracked;
         let predicted = match self.controller.estimator.method {
             EstimatorMethod::Reference => modes,
-            EstimatorMethod::Sliding | EstimatorMethod::None => {
+            EstimatorMethod::Observer | EstimatorMethod::Sliding | EstimatorMethod::None => {
                 self.controller.estimator.predictors.len()
             }
         };
@@ -128,6 +128,7 @@ impl Design {
                 ));
             }
         }
+        self.controller.estimator.check(dims)?;
         if tracked.iter().any(|&row| row >= dims.outputs) {
             return Err(format!(
                 "the design tracks an output beyond its {}",

@@ -133,6 +133,7 @@ fn observer(design: &Design) -> Vec<(String, String)> {
 fn estimator(design: &Design) -> Vec<(String, String)> {
     let estimator = &design.controller.estimator;
     let method = match estimator.method {
+        EstimatorMethod::Observer => "observer (hypotheses about sensors and plant in competition)",
         EstimatorMethod::Reference => "reference (predictor from a healthy database)",
         EstimatorMethod::Sliding => "sliding window as printed",
         EstimatorMethod::None => "none",

@@ -114,6 +114,9 @@ fn observer(design: &Design) -> String {
 
 fn method(method: EstimatorMethod) -> &'static str {
     match method {
+        EstimatorMethod::Observer => {
+            "hypotheses about sensors and plant in competition, each with its Kalman filter"
+        }
         EstimatorMethod::Reference => "projection on a healthy database (reference window)",
         EstimatorMethod::Sliding => "projection on a sliding window, as printed in the paper",
         EstimatorMethod::None => "none",
