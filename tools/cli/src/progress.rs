@@ -1,4 +1,4 @@
-//! A sign of life on the terminal.
+//! What the program is doing, shown on the terminal while it runs.
 
 use indicatif::{ProgressBar, ProgressDrawTarget};
 use std::time::Duration;
