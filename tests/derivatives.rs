@@ -7,7 +7,7 @@
 
 mod common;
 
-use common::{Channel, controller, plant, reference, scenario};
+use common::{Channel, controller, plant, reference, scenario, state_based};
 use ftc_control::parameters::{Compensation, EstimatorMethod, Limits};
 use ftc_control::{Compensate, Controller, ControllerParameters, ControllerState, Sample};
 use ftc_plant::rectifier::Rectifier;
@@ -38,6 +38,7 @@ fn design() -> impl Strategy<Value = Design> {
         Compensation::None,
     ]);
     let method = prop::sample::select(vec![
+        EstimatorMethod::Observer,
         EstimatorMethod::Reference,
         EstimatorMethod::Sliding,
         EstimatorMethod::None,
@@ -58,6 +59,9 @@ fn design() -> impl Strategy<Value = Design> {
 fn parameters(design: Design) -> ControllerParameters {
     let mut parameters = controller(Channel::State, 0.005);
     parameters.compensation = design.compensation;
+    if design.method == EstimatorMethod::Observer {
+        parameters = state_based(parameters);
+    }
     parameters.estimator.method = design.method;
     parameters.estimator.adapt = design.adapt;
     parameters.feedback.latency = design.latency;

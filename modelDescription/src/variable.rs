@@ -84,6 +84,14 @@ pub enum Role {
     Residual,
     /// `fault`, flags (p).
     FaultFlag,
+    /// `suspect`, flags (p).
+    Suspect,
+    /// `model_valid`, a flag.
+    ModelValid,
+    /// `load_hat` (m).
+    LoadEstimate,
+    /// `actuator_fault`, flags (m).
+    ActuatorFault,
     /// `ftc_enabled`, switches the compensation.
     FtcEnabled,
     /// `threshold`, of the residuals (p).

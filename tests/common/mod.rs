@@ -6,7 +6,9 @@ use ftc_control::parameters::{
     Compensation, Estimator, EstimatorMethod, FeedbackGains, Gain, Harmonics, Limits, Observer,
     ObserverKind, StateFeedback,
 };
+use ftc_design::assembly::KnownDisturbance;
 use ftc_design::commissioning;
+use ftc_design::{HypothesesSpec, Signal, Signals};
 use ftc_plant::Scenario;
 use ftc_plant::scenario::{ModeInterval, Waveform};
 use ftc_plant::{Mode, OperatingPoint, SwitchedPlant};
@@ -202,4 +204,35 @@ pub fn controller(channel: Channel, noise: f64) -> ControllerParameters {
         input_limits: vec![Limits::default(); 2],
         plant,
     }
+}
+
+/// The same controller with the state-based estimator.
+#[allow(dead_code)]
+pub fn state_based(mut parameters: ControllerParameters) -> ControllerParameters {
+    let signals = |name: &str, count: usize| -> Vec<Signal> {
+        let signal = |at| Signal {
+            name: format!("{name}[{at}]"),
+            unit: None,
+            nominal: 1.0,
+            min: None,
+            max: None,
+        };
+        (1..=count).map(signal).collect()
+    };
+    let dims = parameters.plant.dimensions();
+    let signals = Signals {
+        inputs: signals("u", dims.inputs),
+        outputs: signals("y", dims.outputs),
+        states: signals("x", dims.states),
+    };
+    let known = KnownDisturbance {
+        period: core::f64::consts::TAU / 0.02,
+        harmonics: 1,
+        amplitude: None,
+    };
+    let settings = HypothesesSpec::default().settings(&parameters.plant, &signals, Some(&known));
+    parameters.estimator.method = EstimatorMethod::Observer;
+    parameters.estimator.largest_fault = settings.authority.clone();
+    parameters.estimator.hypotheses = Some(settings);
+    parameters
 }

@@ -68,6 +68,11 @@ fn signals(name: &str, count: usize) -> Vec<Signal> {
 
 /// A random plant with a certified design; draws until one exists.
 pub fn design(dice: &mut Dice) -> Design {
+    design_with(dice, EstimatorMethod::Reference)
+}
+
+/// The same with an estimator of one's choice.
+pub fn design_with(dice: &mut Dice, method: EstimatorMethod) -> Design {
     loop {
         let (n, m, p) = (dice.count(1, 5), dice.count(1, 3), dice.count(1, 3));
         let output = dice.matrix(p, n);
@@ -126,7 +131,7 @@ pub fn design(dice: &mut Dice) -> Design {
                 noise: Vec::new(),
             },
             estimator: EstimatorSpec {
-                method: EstimatorMethod::Reference,
+                method,
                 response_length: None,
                 database: DatabaseSource::Commission,
                 threshold: Threshold::Sigmas(6.0),

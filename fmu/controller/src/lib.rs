@@ -6,6 +6,7 @@
 
 use fmu_abi::clock::Event;
 use fmu_abi::{Refusal, Slave, Values, nearest_mode, require_finite, resource, selected_mode};
+use ftc_control::estimator::hypotheses::{Sensors, has};
 use ftc_control::{Change, Compensate, Controller, ControllerState, Sample};
 use model_description::{CONTROLLER, DESIGN_FILE, Interface, Role, Span, VariableTable};
 use std::path::Path;
@@ -35,6 +36,10 @@ struct Spans {
     fault_estimate: Span,
     residual: Span,
     fault_flag: Span,
+    suspect: Span,
+    model_valid: Span,
+    load_estimate: Span,
+    actuator_fault: Span,
 }
 
 impl Spans {
@@ -51,6 +56,10 @@ impl Spans {
             fault_estimate: table.span(Role::FaultEstimate),
             residual: table.span(Role::Residual),
             fault_flag: table.span(Role::FaultFlag),
+            suspect: table.span(Role::Suspect),
+            model_valid: table.span(Role::ModelValid),
+            load_estimate: table.span(Role::LoadEstimate),
+            actuator_fault: table.span(Role::ActuatorFault),
         }
     }
 }
@@ -96,6 +105,16 @@ impl ControllerFmu {
         {
             *slot = f64::from(u8::from(flagged));
         }
+        let Some(bank) = &state.bank else { return };
+        let flag = |set: Sensors, at: usize| f64::from(u8::from(has(set, at)));
+        for (at, slot) in values.get_mut(spans.suspect).iter_mut().enumerate() {
+            *slot = flag(bank.suspect, at);
+        }
+        for (at, slot) in values.get_mut(spans.actuator_fault).iter_mut().enumerate() {
+            *slot = flag(bank.actuator_fault, at);
+        }
+        values.set(spans.load_estimate, &bank.load);
+        values.set(spans.model_valid, &[f64::from(u8::from(bank.model_valid))]);
     }
 }
 

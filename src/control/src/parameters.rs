@@ -163,7 +163,7 @@ pub struct Estimator {
     /// Method.
     pub method: EstimatorMethod,
     /// Sizes and rates for [`EstimatorMethod::Observer`].
-    #[serde(default)]
+    #[serde(default, skip_serializing_if = "Option::is_none")]
     pub hypotheses: Option<Hypotheses>,
     /// `j`: how many past inputs the output remembers.
     pub response_length: usize,

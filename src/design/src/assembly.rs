@@ -2,7 +2,7 @@
 
 use super::commissioning::{self, Database, LONGEST_RESPONSE, RecordedDisturbance};
 use super::harmonics;
-use super::hypotheses::{self, HypothesesSpec};
+use super::hypotheses::HypothesesSpec;
 use super::{
     ControlSpec, Design, DesignError, FORMAT, ObserverSpec, Signal, Signals, check_controllable,
     synthesise,
@@ -256,7 +256,11 @@ fn estimator(request: &Request, dims: Dimensions) -> Result<Estimator, String> {
     let harmonic_transfers = harmonics.as_ref().map_or_else(Vec::new, |known| {
         harmonics::transfers(&request.plant, known.period, known.count)
     });
-    let hypotheses = state_based.then(|| hypotheses::settings(request));
+    let hypotheses = state_based.then(|| {
+        let known = spec.disturbance.as_ref();
+        spec.hypotheses
+            .settings(&request.plant, &request.signals, known)
+    });
     let largest_fault = hypotheses.as_ref().map_or_else(
         || outputs.iter().map(largest_fault).collect(),
         |settings| settings.authority.clone(),

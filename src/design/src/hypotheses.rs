@@ -1,7 +1,7 @@
 //! Sizes and rates for the state-based estimator, from the plant and its signals.
 
-use crate::assembly::Request;
-use crate::{Signal, assembly};
+use crate::assembly::{self, KnownDisturbance};
+use crate::{Signal, Signals};
 use ftc_control::parameters::{Ambiguous, Hypotheses};
 use ftc_plant::{Mode, SwitchedPlant};
 
@@ -74,54 +74,59 @@ const DISTURBANCE: f64 = 0.3;
 /// Error of the state at the start relative to its nominal value.
 const START: f64 = 3e-3;
 
-/// The estimator's sizes and rates for `request`.
-pub(crate) fn settings(request: &Request) -> Hypotheses {
-    let spec = &request.estimator.hypotheses;
-    let plant = &request.plant;
-    let scaling = assembly::scaling(&request.signals);
-    let outputs = &request.signals.outputs;
-    let known = request.estimator.disturbance.as_ref();
-    let amplitude = known.and_then(|known| known.amplitude.clone());
-    let disturbance = amplitude
-        .filter(|sizes| sizes.iter().all(|&size| size > 0.0))
-        .unwrap_or_else(|| unknown_disturbance(plant, &scaling.outputs));
-    let angles = known.map_or_else(Vec::new, |known| known.angles(plant.sample_time));
-    let waves = disturbance
-        .iter()
-        .flat_map(|&size| vec![size; 2 * angles.len()]);
-    Hypotheses {
-        fault_rate: spec.fault_rate,
-        stuck_rate: STUCK_RATE,
-        release_rate: 1.0 / spec.fault_length,
-        change_rate: CHANGE_RATE,
-        load_rate: LOAD_RATE,
-        load_moving: LOAD_MOVING,
-        surprise: SURPRISE,
-        odds: ODDS,
-        fault_size: per_sensor(plant, outputs, FAULT_OF_RANGE, FAULT_SIZE),
-        fault_walk: FAULT_WALK,
-        drift_walk: DRIFT_WALK,
-        input_load: spec
-            .input_load
-            .clone()
-            .unwrap_or_else(|| scaled(&scaling.inputs, INPUT_LOAD)),
-        disturbance_size: waves.collect(),
-        disturbance_load: disturbance,
-        state_load: scaled(&scaling.states, STATE_LOAD),
-        load_walk: LOAD_WALK,
-        model_error: spec.model_error,
-        gain_error: GAIN_ERROR,
-        gain_walk: GAIN_WALK,
-        period_error: PERIOD_ERROR,
-        angles,
-        start: scaled(&scaling.states, START),
-        start_elsewhere: scaling.states.clone(),
-        state_size: scaling.states,
-        authority: spec
-            .authority
-            .clone()
-            .unwrap_or_else(|| per_sensor(plant, outputs, 1.0, AUTHORITY)),
-        ambiguous: spec.ambiguous,
+impl HypothesesSpec {
+    /// The estimator's sizes and rates for `plant` with these signals, under the disturbance that is
+    /// `known`.
+    pub fn settings(
+        &self,
+        plant: &SwitchedPlant,
+        signals: &Signals,
+        known: Option<&KnownDisturbance>,
+    ) -> Hypotheses {
+        let scaling = assembly::scaling(signals);
+        let outputs = &signals.outputs;
+        let disturbance = known
+            .and_then(|known| known.amplitude.clone())
+            .filter(|sizes| sizes.iter().all(|&size| size > 0.0))
+            .unwrap_or_else(|| unknown_disturbance(plant, &scaling.outputs));
+        let angles = known.map_or_else(Vec::new, |known| known.angles(plant.sample_time));
+        let waves = disturbance
+            .iter()
+            .flat_map(|&size| vec![size; 2 * angles.len()]);
+        Hypotheses {
+            fault_rate: self.fault_rate,
+            stuck_rate: STUCK_RATE,
+            release_rate: 1.0 / self.fault_length,
+            change_rate: CHANGE_RATE,
+            load_rate: LOAD_RATE,
+            load_moving: LOAD_MOVING,
+            surprise: SURPRISE,
+            odds: ODDS,
+            fault_size: per_sensor(plant, outputs, FAULT_OF_RANGE, FAULT_SIZE),
+            fault_walk: FAULT_WALK,
+            drift_walk: DRIFT_WALK,
+            input_load: spec
+                .input_load
+                .clone()
+                .unwrap_or_else(|| scaled(&scaling.inputs, INPUT_LOAD)),
+            disturbance_size: waves.collect(),
+            disturbance_load: disturbance,
+            state_load: scaled(&scaling.states, STATE_LOAD),
+            load_walk: LOAD_WALK,
+            model_error: self.model_error,
+            gain_error: GAIN_ERROR,
+            gain_walk: GAIN_WALK,
+            period_error: PERIOD_ERROR,
+            angles,
+            start: scaled(&scaling.states, START),
+            start_elsewhere: scaling.states.clone(),
+            state_size: scaling.states,
+            authority: spec
+                .authority
+                .clone()
+                .unwrap_or_else(|| per_sensor(plant, outputs, 1.0, AUTHORITY)),
+            ambiguous: self.ambiguous,
+        }
     }
 }
 

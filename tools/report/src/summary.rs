@@ -1,8 +1,8 @@
 //! The design report, for a person and for a program.
 
-use crate::text::count;
+use crate::text::{count, number};
 use crate::warnings;
-use ftc_control::parameters::{EstimatorMethod, ObserverKind};
+use ftc_control::parameters::{EstimatorMethod, Hypotheses, ObserverKind};
 use ftc_design::{ControlSpec, Design, DesignError, ObserverDesign, Signal, StateFeedback};
 use serde_json::{Value, json};
 use std::fmt::Write;
@@ -130,6 +130,15 @@ fn observer(design: &Design) -> Vec<(String, String)> {
     lines
 }
 
+/// Whom the estimator believes where a slow divergence could be a drift or a load.
+fn ambiguous(settings: &Hypotheses) -> &'static str {
+    if settings.trusts_model() {
+        "the model is believed"
+    } else {
+        "the sensors are believed, suspect is raised"
+    }
+}
+
 fn estimator(design: &Design) -> Vec<(String, String)> {
     let estimator = &design.controller.estimator;
     let method = match estimator.method {
@@ -143,10 +152,29 @@ fn estimator(design: &Design) -> Vec<(String, String)> {
         return lines;
     }
     let outputs = &design.signals.outputs;
-    lines.push(line(
-        "response length",
-        count(estimator.response_length, "sample"),
-    ));
+    if let Some(settings) = &estimator.hypotheses {
+        lines.push(line(
+            "model error",
+            format!(
+                "{} % of each entry, assumed",
+                number(100.0 * settings.model_error)
+            ),
+        ));
+        lines.push(line(
+            "fault rate",
+            format!("{:e} a sample and sensor", settings.fault_rate),
+        ));
+        lines.push(line("slow divergence", ambiguous(settings)));
+        lines.push(line(
+            "largest correction",
+            with_units(&settings.authority, outputs),
+        ));
+    } else {
+        lines.push(line(
+            "response length",
+            count(estimator.response_length, "sample"),
+        ));
+    }
     for (index, predictor) in estimator.predictors.iter().enumerate() {
         lines.push(line(
             format!("mode {}", index + 1),
@@ -161,10 +189,12 @@ fn estimator(design: &Design) -> Vec<(String, String)> {
         "thresholds",
         with_units(&estimator.thresholds, outputs),
     ));
-    lines.push(line(
-        "debounce",
-        count(estimator.debounce as usize, "sample"),
-    ));
+    if estimator.hypotheses.is_none() {
+        lines.push(line(
+            "debounce",
+            count(estimator.debounce as usize, "sample"),
+        ));
+    }
     if estimator.stuck_after > 0 {
         lines.push(line(
             "stuck after",

@@ -47,16 +47,27 @@ pub fn facts(design: &Design) -> Vec<(String, String)> {
         ("Fault estimator", method(estimator.method).into()),
     ];
     if estimator.method != EstimatorMethod::None {
-        let length = estimator.response_length;
-        facts.push((
-            "Response length",
-            format!(
-                "{} ({} s)",
-                count(length, "sample"),
-                number(length as f64 * te)
-            ),
-        ));
-        facts.push(("Debounce", count(estimator.debounce as usize, "sample")));
+        if let Some(settings) = &estimator.hypotheses {
+            let error = format!(
+                "{} % of each entry, assumed",
+                number(100.0 * settings.model_error)
+            );
+            facts.push(("Model error", error));
+            let policy = if settings.trusts_model() {
+                "the model is believed"
+            } else {
+                "the sensors are believed, suspect is raised"
+            };
+            facts.push(("Slow divergence", policy.into()));
+        } else {
+            let length = estimator.response_length;
+            let time = number(length as f64 * te);
+            facts.push((
+                "Response length",
+                format!("{} ({time} s)", count(length, "sample")),
+            ));
+            facts.push(("Debounce", count(estimator.debounce as usize, "sample")));
+        }
         if estimator.stuck_after > 0 {
             let repetitions = count(estimator.stuck_after as usize, "repetition");
             facts.push(("Frozen sensor", format!("after {repetitions} of a reading")));

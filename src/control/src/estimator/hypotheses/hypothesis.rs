@@ -202,7 +202,7 @@ impl Innovation {
             }
         }
         log += libm::log(product);
-        -0.5 * self.square.min(1e5) - log
+        (-0.5 * self.square.min(1e5) - log).max(-1e6)
     }
 }
 
@@ -240,6 +240,7 @@ impl Kinds {
 }
 
 impl Hypothesis {
+    /// Who is faulty, and how.
     pub const fn kinds(&self) -> Kinds {
         Kinds {
             additive: self.additive,
@@ -533,7 +534,18 @@ impl Hypothesis {
                 model.bias[k - fault] * settings.model_error * settings.model_error
             };
             let variance = self.cov[k * size + k];
-            if variance <= most {
+            if (0.0..=most).contains(&variance) {
+                continue;
+            }
+            if !(variance > most) {
+                // Cancellation has spoilt it: start anew.
+                let fresh = if k < n {
+                    settings.start_elsewhere[k] * settings.start_elsewhere[k]
+                } else {
+                    most
+                };
+                let mean = self.z[k];
+                self.open(k, mean, fresh);
                 continue;
             }
             let scale = if variance.is_finite() {

@@ -154,6 +154,8 @@ pub struct BankState {
     pub model_valid: bool,
     /// What acts on the plant beside the command, as an input (m).
     pub load: Vec<f64>,
+    /// Inputs on which that exceeds the size of a usual load, as bits.
+    pub actuator_fault: u64,
 }
 
 crate::state!(BankState {
@@ -170,7 +172,8 @@ crate::state!(BankState {
         misfit,
         accused,
         suspect,
-        model_valid
+        model_valid,
+        actuator_fault
     ]
 });
 
@@ -347,7 +350,7 @@ impl Bank {
 
     fn conclude(&self, state: &mut BankState, model: &ModeModel, reading: Reading<'_>) {
         let layout = self.layout;
-        let Layout { n, m, p, d } = layout;
+        let Layout { n, p, d, .. } = layout;
         let h = &state.slots[state.best];
         for q in 0..p {
             state.expected[q] = model.output_offset[q]
@@ -365,12 +368,21 @@ impl Bank {
         }
         state.misfit += RENEWED * (state.seen[state.best].square.min(1e3) - state.misfit);
         state.model_valid = state.misfit < 4.0 * p as f64 && !h.moving;
-        state.load.fill(0.0);
+        self.find_load(state, model);
+        state.actuator_fault = 0;
+        for (j, (load, size)) in state.load.iter().zip(&self.settings.input_load).enumerate() {
+            state.actuator_fault |= u64::from(load.abs() > *size && j < 64) << (j & 63);
+        }
+    }
+
+    /// Load and gain error of the leading hypothesis as an input.
+    fn find_load(&self, state: &mut BankState, model: &ModeModel) {
+        let Layout { n, m, .. } = self.layout;
+        let (load, gain) = (self.layout.load(), self.layout.gain());
+        let z = &state.slots[state.best].z;
         for j in 0..m {
-            state.load[j] = dot(
-                &model.b_inverse[j * n..(j + 1) * n],
-                &h.z[layout.load()..layout.load() + n],
-            ) + state.u[j] * h.z[layout.gain() + j];
+            state.load[j] = dot(&model.b_inverse[j * n..(j + 1) * n], &z[load..load + n])
+                + state.u[j] * z[gain + j];
         }
     }
 
@@ -399,6 +411,7 @@ impl Bank {
             state.expected[q] = dot(&model.c[q * n..(q + 1) * n], &h.z[..n])
                 + dot(&model.f[q * d..(q + 1) * d], &h.z[n..n + d]);
         }
+        self.find_load(state, model);
     }
 
     /// One sample on, under the input that acts (m).

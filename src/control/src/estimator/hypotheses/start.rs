@@ -192,6 +192,7 @@ impl Bank {
             suspect: 0,
             model_valid: true,
             load: vec![0.0; m],
+            actuator_fault: 0,
         }
     }
 }
