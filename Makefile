@@ -13,10 +13,10 @@ TOOLS := $(CURDIR)/target/tools
 
 .PHONY: build fmu-linux64 fmu-all wheel test-wheel compare-platforms test test-rust test-python browser demo bench fuzz soak memcheck threadcheck lint clean
 
-# The FMU binaries are made by themselves, with the profile meant for them: built with the whole
-# workspace they would carry the solver's symbols along.
+# The program, and the FMU binaries by themselves with the profile meant for them: built with the
+# whole workspace they would carry the solver's symbols along.
 build:
-	cargo build --release --workspace --exclude ftc-python
+	cargo build --release --package ftc-fmu
 	cargo build --profile fmu --package ftc-controller-fmu --package ftc-plant-fmu
 	tools/platforms/native.sh
 

@@ -34,7 +34,7 @@ const WINDOWS: [(&str, f64, f64); 4] = [
     ("from inside the hold on", 810.0, 1100.0),
 ];
 
-/// How far a fault of `sensors` that nobody is accused of can move a true output. It stays below its
+/// How far a fault of `sensors` that stays undetected can move a true output. It stays below its
 /// threshold beside what the disturbance does to that output, for which it can be taken, and has at
 /// every tick the sign that does most harm. The sum of the magnitudes of the believing loop's
 /// response to a fault of one tick, times that size, is the bound.

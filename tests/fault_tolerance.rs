@@ -1,5 +1,5 @@
-//! The promise of the whole method on the paper's scenario A: with a lying sensor the true output
-//! behaves as if the controller had been told the truth.
+//! The method as a whole on the paper's scenario A: with a faulty sensor the true output
+//! is as good as with a controller that is told the fault.
 //!
 //! promise: told-the-fault
 

@@ -1,4 +1,4 @@
-//! Observers without some of their sensors: served, proved, blind to what is lost.
+//! Observers without some of their sensors: served, proved, independent of what is lost.
 
 mod plants;
 

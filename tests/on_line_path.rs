@@ -1,36 +1,14 @@
-//! The on-line path is sacred: no allocation, finite in and finite out, the same bits every time.
+//! The on-line path: no allocation, finite in and finite out, the same bits every time.
 //!
 //! promise: no-allocation
 
 mod common;
 
 use common::{Channel, controller, reference, scenario};
+use ftc_control::parameters::Transfer;
 use ftc_control::{Compensate, Controller, ControllerState, Sample};
 use ftc_simulate::{PlantSimulator, Variant, run};
 use proptest::prelude::*;
-use std::alloc::{GlobalAlloc, Layout, System};
-use std::cell::Cell;
-
-/// Counts this thread's allocations.
-struct Counting;
-
-thread_local! {
-    static ALLOCATIONS: Cell<u64> = const { Cell::new(0) };
-}
-
-// SAFETY: every call is handed on to the system allocator unchanged.
-unsafe impl GlobalAlloc for Counting {
-    unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
-        ALLOCATIONS.with(|count| count.set(count.get() + 1));
-        unsafe { System.alloc(layout) }
-    }
-    unsafe fn dealloc(&self, pointer: *mut u8, layout: Layout) {
-        unsafe { System.dealloc(pointer, layout) }
-    }
-}
-
-#[global_allocator]
-static ALLOCATOR: Counting = Counting;
 
 fn tick(
     controller: &Controller,
@@ -70,25 +48,22 @@ fn outputs(state: &ControllerState) -> Vec<f64> {
 fn a_tick_allocates_nothing() {
     let controller = Controller::new(controller(Channel::State, 0.005));
     let mut state = controller.initial_state(0);
-    let before = ALLOCATIONS.with(Cell::get);
-    for k in 0..2000_u64 {
-        let lost = if k % 97 == 0 { f64::NAN } else { 0.01 };
-        tick(
-            &controller,
-            &mut state,
-            k,
-            (k / 300) as usize % 2,
-            &[lost, 0.02],
-            &[0.3, -0.1],
-        );
-    }
-    assert_eq!(ALLOCATIONS.with(Cell::get) - before, 0);
-    drop(Box::new(1));
-    assert_ne!(
-        ALLOCATIONS.with(Cell::get),
-        before,
-        "the counter must count"
-    );
+    let counted = allocation_counter::measure(|| {
+        for k in 0..2000_u64 {
+            let lost = if k % 97 == 0 { f64::NAN } else { 0.01 };
+            tick(
+                &controller,
+                &mut state,
+                k,
+                (k / 300) as usize % 2,
+                &[lost, 0.02],
+                &[0.3, -0.1],
+            );
+        }
+    });
+    assert_eq!(counted.count_total, 0);
+    let counted = allocation_counter::measure(|| drop(std::hint::black_box(Box::new(1))));
+    assert_eq!(counted.count_total, 1, "the counter must count");
 }
 
 #[test]
@@ -124,26 +99,40 @@ fn the_same_inputs_give_the_same_bits_and_a_copy_is_a_snapshot() {
     assert_eq!(state, copy);
 }
 
-/// With `bumpless`, the first command in a mode is the last of the mode before.
+/// With bumpless transfer, the first command in a mode is the last of the mode before, unless the last
+/// transfer was too short a time ago.
 #[test]
 fn a_bumpless_switch_leaves_the_command_where_it_was() {
-    for bumpless in [false, true] {
+    for transfer in [
+        None,
+        Some(Transfer {
+            samples: 5,
+            decay: 0.5,
+        }),
+    ] {
         let mut parameters = controller(Channel::State, 0.0);
-        parameters.feedback.bumpless = bumpless;
+        parameters.feedback.transfer = transfer;
         let controller = Controller::new(parameters);
         let mut state = controller.initial_state(0);
+        let mut jump = |k: u64, mode: usize| {
+            let before = state.command.clone();
+            let (y, reference) = ([0.2, -0.1], [0.25, -0.15]);
+            tick(&controller, &mut state, k, mode, &y, &reference);
+            let moved = state.command.iter().zip(&before);
+            moved.map(|(a, b)| (a - b).abs()).fold(0.0, f64::max)
+        };
         for k in 0..50 {
-            tick(&controller, &mut state, k, 0, &[0.2, -0.1], &[0.25, -0.15]);
+            jump(k, 0);
         }
-        let before = state.command.clone();
-        tick(&controller, &mut state, 50, 1, &[0.2, -0.1], &[0.25, -0.15]);
-        let jump = state
-            .command
-            .iter()
-            .zip(&before)
-            .map(|(a, b)| (a - b).abs())
-            .fold(0.0, f64::max);
-        assert_eq!(bumpless, jump < 1e-9, "jump {jump}");
+        assert_eq!(transfer.is_some(), jump(50, 1) < 1e-14);
+        assert!(
+            jump(51, 0) > 1e-3,
+            "two samples are too few for another transfer"
+        );
+        for k in 52..60 {
+            jump(k, 0);
+        }
+        assert_eq!(transfer.is_some(), jump(60, 1) < 1e-14);
     }
 }
 

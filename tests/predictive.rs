@@ -65,7 +65,7 @@ fn the_limits_hold_at_every_tick_and_bind_at_some() {
 }
 
 #[test]
-fn it_believes_a_lying_sensor() {
+fn it_follows_a_faulty_sensor() {
     let trajectory = simulate(1e3, Waveform::Constant { value: 0.5 }, 0.0);
     for y in &trajectory.records[700].y_true {
         assert!((y - 0.1).abs() < 1e-3, "{y}");

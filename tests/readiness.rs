@@ -95,7 +95,7 @@ fn a_known_disturbance_hides_no_larger_bias() {
     );
 }
 
-/// Accused before the switch, stuck across it: the held estimate is worth nothing.
+/// Accused before the switch, stuck across it: the held estimate is wrong by then.
 #[test]
 fn a_stuck_sensor_is_carried_across_a_switch() {
     for parameters in designs() {

@@ -119,6 +119,7 @@ pub fn design_with(dice: &mut Dice, method: EstimatorMethod) -> Design {
                 inputs: signals("u", m),
                 outputs: signals("y", p),
                 states: signals("x", n),
+                disturbances: Vec::new(),
             },
             plant,
             control,

@@ -105,7 +105,7 @@ impl HypothesesSpec {
             fault_size: per_sensor(plant, outputs, FAULT_OF_RANGE, FAULT_SIZE),
             fault_walk: FAULT_WALK,
             drift_walk: DRIFT_WALK,
-            input_load: spec
+            input_load: self
                 .input_load
                 .clone()
                 .unwrap_or_else(|| scaled(&scaling.inputs, INPUT_LOAD)),
@@ -121,7 +121,7 @@ impl HypothesesSpec {
             start: scaled(&scaling.states, START),
             start_elsewhere: scaling.states.clone(),
             state_size: scaling.states,
-            authority: spec
+            authority: self
                 .authority
                 .clone()
                 .unwrap_or_else(|| per_sensor(plant, outputs, 1.0, AUTHORITY)),

@@ -11,6 +11,8 @@ pub mod certificate;
 pub mod commissioning;
 mod controllability;
 #[cfg(feature = "solver")]
+pub mod coverage;
+#[cfg(feature = "solver")]
 mod feedforward;
 pub mod harmonics;
 #[cfg(feature = "solver")]
@@ -21,6 +23,7 @@ mod lyapunov;
 pub mod observer;
 mod record;
 pub(crate) mod riccati;
+pub mod running_loop;
 mod spec;
 pub mod state_feedback;
 mod units;
@@ -41,6 +44,7 @@ pub use hypotheses::HypothesesSpec;
 pub use lyapunov::{DwellTime, Lyapunov};
 pub use observer::{LostCertificate, ObserverCertificate, ObserverDesign};
 pub use record::{Design, FORMAT, Signal, Signals};
+pub use running_loop::{LostSensors, RunningLoop, SwitchingGain};
 pub use spec::{ControlSpec, Objective, ObserverChoice, ObserverSpec};
 pub use state_feedback::{ModeGains, StateFeedback};
 pub use units::Units;
@@ -56,6 +60,8 @@ pub struct Synthesis {
     pub state_feedback: StateFeedback,
     /// The observer (11)-(17).
     pub observer: ObserverDesign,
+    /// What is proved of both together, as the controller runs them.
+    pub running_loop: RunningLoop,
 }
 
 impl Synthesis {
@@ -65,7 +71,16 @@ impl Synthesis {
     /// The first inequality that cannot be proved, or what does not fit.
     pub fn verify(&self, plant: &SwitchedPlant) -> Result<(), CertificateError> {
         self.state_feedback.verify(plant)?;
-        self.observer.verify(plant)
+        self.observer.verify(plant)?;
+        let (control, observer) = (&self.state_feedback, &self.observer);
+        self.running_loop.verify(plant, control, observer)
+    }
+
+    /// Proves bumpless transfer of the loop as well; `false` where no proof is found.
+    #[cfg(feature = "solver")]
+    pub fn certify_transfer(&mut self, plant: &SwitchedPlant) -> bool {
+        let (control, observer) = (&self.state_feedback, &self.observer);
+        self.running_loop.certify_transfer(plant, control, observer)
     }
 }
 
@@ -82,10 +97,11 @@ pub fn synthesise(
     scaling: &Scaling,
 ) -> Result<Synthesis, DesignError> {
     let state_feedback = state_feedback::synthesise(plant, control, scaling)?;
-    let observer = observer::synthesise(plant, observer, scaling)?;
+    let (observer, running_loop) = running_loop::choose(plant, &state_feedback, observer, scaling)?;
     Ok(Synthesis {
         state_feedback,
-        observer: observer::with_lost_sensors(plant, observer, observer::USUAL_RATIO),
+        observer,
+        running_loop,
     })
 }
 

@@ -149,8 +149,8 @@ fn values() {
         (
             "unknown observer",
             "\"uio\"",
-            "\"kalman\"",
-            &["observer.kind", "use one of uio, luenberger, auto"],
+            "\"unheard-of\"",
+            &["observer.kind", "use one of uio, luenberger, kalman, auto"],
         ),
         (
             "unknown method",

@@ -242,7 +242,7 @@ fn a_second_run_replaces_the_first() {
     assert_eq!(bench.files().len(), first.len() + 1);
 }
 
-/// A directory that bears the name of a file to be written is named, and no file is left behind.
+/// A directory that has the name of a file to be written is named, and no file is left behind.
 #[test]
 fn all_files_or_none() {
     let bench = Bench::new(SOUND);
@@ -381,6 +381,32 @@ fn an_fmu_holds_every_platform_that_is_there_and_belongs_to_its_design() {
     }
 }
 
+/// Binaries of another platform that are older than those of this machine were made from other sources.
+#[cfg(target_os = "linux")]
+#[test]
+fn binaries_older_than_those_of_this_machine_are_left_out() {
+    use std::time::{Duration, SystemTime};
+    let bench = Bench::new(SOUND);
+    let others = [
+        "fmu-binaries/win64/ftc_controller.dll",
+        "fmu-binaries/win64/ftc_plant.dll",
+    ];
+    let own = ["libftc_controller_fmu.so", "libftc_plant_fmu.so"];
+    let program = installed(&bench, &[own, others].concat());
+    for library in others {
+        let path = bench.path("bin").join(library);
+        let file = fs::File::options().write(true).open(path).unwrap();
+        file.set_modified(SystemTime::now() - Duration::from_secs(60))
+            .unwrap();
+    }
+    let output = export(&bench, &program, "out");
+    let said = String::from_utf8(output.stdout).unwrap();
+    assert!(said.contains("(built for this machine)"), "{said}");
+    assert!(said.contains("left out win64"), "{said}");
+    let files = unzip(&bench.path("out/sound_plant.fmu"));
+    assert!(!files.keys().any(|name| name.contains("win64")));
+}
+
 #[test]
 fn the_same_design_gives_the_same_bytes() {
     let bench = Bench::new(SOUND);
@@ -473,7 +499,7 @@ fn baselines_are_written_beside_the_variants() {
         let bound = mse("deadbeat_bound");
         assert_eq!(bound.len(), 2);
         assert!(bound.iter().all(|&bound| bound > 0.0));
-        // Nobody follows faster than the plant can. Between jumps 10 samples apart, an output that
+        // No controller follows faster than the plant allows. Between jumps 10 samples apart, an output that
         // never quite arrives may save a tenth: min over e of (1 - e)^2 + 9 e^2 is 0.9.
         for key in ["ftc", "told_the_fault", "additive", "mpc"] {
             for (found, least) in mse(key).iter().zip(&bound) {

@@ -1,4 +1,4 @@
-//! Designs and faults under which the loop once went wrong, kept as they were found.
+//! Regression tests: designs and faults under which the loop diverged or a fault was not seen.
 //!
 //! promise: fault-kinds
 #![allow(missing_docs)]

@@ -32,7 +32,7 @@ fn rows(mode: usize, samples: usize, from: usize) -> Vec<[f64; 5]> {
         .collect()
 }
 
-/// A log as text; the outputs bear the names of the sound design.
+/// A log as text; the outputs have the names of the sound design.
 fn log(rows: &[[f64; 5]]) -> String {
     let mut text = "t,u[1],u[2],a,b\n".to_string();
     for [t, u1, u2, y1, y2] in rows {
@@ -353,7 +353,7 @@ fn files_that_do_not_fit_the_modes() {
     fs_refused_method(&pair);
 }
 
-/// A log that nobody reads is refused rather than ignored.
+/// A log that no estimator uses is refused rather than ignored.
 fn fs_refused_method(pair: &[(&str, &str)]) {
     let bench = bench(PAIR, pair);
     let design = fs::read_to_string(bench.path(FILE)).unwrap();

@@ -131,7 +131,7 @@ fn the_papers_claims_are_put_to_the_test() {
     assert!(claims["words"].as_array().unwrap().len() >= 8);
 }
 
-/// With a lying sensor the proposed controller is ahead, whatever the kind of fault.
+/// With a faulty sensor the proposed controller is ahead, whatever the kind of fault.
 #[test]
 fn the_converter_under_every_fault() {
     let (page, _, table) = reproduce("converter");

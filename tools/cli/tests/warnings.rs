@@ -1,4 +1,4 @@
-//! What is sound but worth a word is told in one sentence each: in the report, as JSON, on the page.
+//! Warnings of designs that are sound, one sentence each: in the report, as JSON, on the page.
 #![allow(missing_docs)]
 
 mod common;

@@ -253,6 +253,7 @@ fn signals(
         inputs,
         outputs,
         states,
+        disturbances: Vec::new(),
     })
 }
 

@@ -8,7 +8,7 @@ const LARGEST: f64 = 1e15;
 /// No positive one is smaller; beyond it quotients overflow.
 const SMALLEST: f64 = 1.0 / LARGEST;
 
-/// A finite number of bearable size.
+/// A finite number of practical size.
 pub fn number(value: f64) -> Result<(), String> {
     if value.is_finite() && value.abs() <= LARGEST {
         Ok(())

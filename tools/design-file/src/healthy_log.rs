@@ -1,7 +1,7 @@
 //! Logs of healthy operation: from CSV files to the stretches of each mode, or one sentence.
 //!
 //! A row is one sample: the inputs that act from it on and the outputs measured at it, in physical
-//! units. Columns bear the user's signal names or `u[1]`, `y[1]` ...; `t` (seconds) and `mode`
+//! units. Columns have the user's signal names or `u[1]`, `y[1]` ...; `t` (seconds) and `mode`
 //! (from 1) are optional, every other column is ignored.
 
 use crate::{check, sentence, suggest, values::NameOrList};
@@ -299,7 +299,7 @@ impl Columns {
     }
 }
 
-/// The column of a signal, under the user's name or under its number. A column that bears the name
+/// The column of a signal, under the user's name or under its number. A column that has the name
 /// of another signal, among those `known`, was not meant.
 fn column(names: &[&str], name: &str, number: &str, known: &[&str]) -> Result<usize, String> {
     if let Some(at) = once(names, name)?.map_or_else(|| once(names, number), |at| Ok(Some(at)))? {

@@ -3,6 +3,27 @@
 //!
 //! [`schema`] is what a file may hold, [`defaults`] what an absent key means, [`check`] what a value
 //! must satisfy; [`assemble`] turns all of it into a [`Request`], [`healthy_log`] reads logs.
+//!
+//! ```
+//! use std::path::Path;
+//!
+//! let text = r#"
+//! name = "heater"
+//! sample_time = 10.0
+//! [[mode]]
+//! A = [[0.9]]
+//! B = [[0.2]]
+//! C = [[1.0]]
+//! [controller]
+//! decay = 1.5
+//! "#;
+//! let error = design_file::parse(text, Path::new("")).unwrap_err();
+//! assert_eq!(error.key.as_deref(), Some("controller.decay"));
+//! assert_eq!(error.line, Some(9));
+//!
+//! let loaded = design_file::parse(&text.replace("1.5", "0.95"), Path::new("")).unwrap();
+//! assert_eq!(loaded.request.plant.modes.len(), 1);
+//! ```
 
 pub mod assemble;
 pub mod check;

@@ -138,7 +138,7 @@ fn plain_types(message: &str) -> String {
     })
 }
 
-/// The message on one line, of bearable length.
+/// The message on one line, of limited length.
 fn one_line(message: &str) -> String {
     let words: Vec<&str> = message.split_whitespace().collect();
     let line = words.join(" ");

@@ -3,6 +3,24 @@
 //! [`export`] writes the controller FMU, the plant FMU and on request an SSP package that connects
 //! them; nothing is compiled and the same design gives the same bytes. [`verify`] proves the
 //! certificate of a written FMU again. [`output`] writes a set of files completely or not at all.
+//!
+//! ```no_run
+//! # fn main() -> Result<(), Box<dyn std::error::Error>> {
+//! let request = design_file::read("heater.toml".as_ref())?.request;
+//! let design = ftc_design::assembly::assemble(request)?;
+//! let options = package::Options {
+//!     out: "out".into(),
+//!     binaries: "target/release".into(),
+//!     ssp: false,
+//!     platforms: None,
+//! };
+//! for path in package::export(&design, &options)?.paths {
+//!     println!("{}", path.display());
+//! }
+//! println!("{}", package::verify("out/heater_controller.fmu".as_ref())?);
+//! # Ok(())
+//! # }
+//! ```
 
 mod archive;
 pub mod certificate;

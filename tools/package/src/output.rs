@@ -196,7 +196,7 @@ mod tests {
             staging.add(name, b"new").unwrap();
         }
         let names = staging.names().unwrap();
-        // The old c cannot be put aside: a directory bears its name there.
+        // The old c cannot be put aside: a directory has its name there.
         let aside = TempDir::new_in(out).unwrap();
         fs::create_dir(aside.path().join("c")).unwrap();
         let message = staging

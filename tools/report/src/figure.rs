@@ -77,7 +77,7 @@ pub enum Dash {
 /// The width of a line.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Weight {
-    /// A hair line.
+    /// A thin line.
     Thin,
     /// A line.
     #[default]
@@ -199,7 +199,7 @@ impl Series {
         Self { step: true, ..self }
     }
 
-    /// Not worth stretching the ordinate for.
+    /// Does not widen the range of the ordinate.
     pub fn secondary(self) -> Self {
         Self {
             leading: false,

@@ -1,4 +1,4 @@
-//! Words and numbers for people.
+//! Numbers and lists in words.
 
 /// A string that is legal in XML: control characters become the replacement character.
 pub fn clean(text: &str) -> String {

@@ -40,17 +40,17 @@ impl EstimatorState {
         y: &[f64],
         dy: &[f64],
     ) {
+        let limits = estimator
+            .hypotheses
+            .as_ref()
+            .map_or(&estimator.largest_fault, |settings| &settings.authority);
         kernel::copy(&mut self.prediction, &bank.expected);
         let sensors = self
             .residual
             .iter_mut()
             .zip(&mut self.fault)
             .zip(&self.flagged);
-        let changes = y
-            .iter()
-            .zip(dy)
-            .zip(&bank.expected)
-            .zip(&estimator.largest_fault);
+        let changes = y.iter().zip(dy).zip(&bank.expected).zip(limits);
         for (((residual, fault), &flagged), (((&y, &dy), &expected), &largest)) in
             sensors.zip(changes)
         {

@@ -238,6 +238,10 @@ impl EstimatorState {
 
     /// Takes over what the state-based estimator said of the readings `y` (p).
     pub(crate) fn adopt(&mut self, estimator: &Estimator, bank: &BankState, y: &[f64]) {
+        let limits = estimator
+            .hypotheses
+            .as_ref()
+            .map_or(&estimator.largest_fault, |settings| &settings.authority);
         kernel::copy(&mut self.prediction, &bank.expected);
         self.judged.fill(true);
         let sensors = self
@@ -245,11 +249,7 @@ impl EstimatorState {
             .iter_mut()
             .zip(&mut self.flagged)
             .zip(&mut self.residual);
-        let said = y
-            .iter()
-            .zip(&bank.residual)
-            .zip(&bank.expected)
-            .zip(&estimator.largest_fault);
+        let said = y.iter().zip(&bank.residual).zip(&bank.expected).zip(limits);
         for (q, (((fault, flagged), residual), (((&y, &left), &expected), &largest))) in
             sensors.zip(said).enumerate()
         {

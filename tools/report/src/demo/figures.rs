@@ -259,7 +259,7 @@ impl<'a> Scene<'a> {
             .filter(|pair| pair[0].mode != pair[1].mode)
             .map(|pair| Mark {
                 at: self.time(pair[1].tick),
-                label: super::facts::mode_name(modes, pair[1].mode),
+                label: super::mode_name(modes, pair[1].mode),
             })
             .collect()
     }

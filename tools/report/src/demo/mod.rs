@@ -1,16 +1,17 @@
 //! The page of one design: what happened in its scenario, with and without fault tolerance.
 
 pub mod events;
-mod facts;
 mod figures;
 mod tables;
 
 use crate::page::{Block, KeyNumber, Page, Section};
+use crate::summary;
 use crate::svg;
 use crate::text::{self, count, list, number};
 use events::Alarms;
 pub use figures::Scene;
 use ftc_design::{Design, Signal};
+use ftc_plant::Mode;
 use ftc_simulate::{Trajectory, Variant};
 
 /// The page of a simulated design as `report.html`, and each of its figures as `KEY.svg`: name and
@@ -64,6 +65,21 @@ fn name_of(signals: &[Signal], index: usize, symbol: &str) -> String {
     )
 }
 
+/// `mode 2`, and its name where the user gave one that says more.
+fn mode_name(modes: &[Mode], index: usize) -> String {
+    let number = index + 1;
+    match modes.get(index) {
+        Some(mode)
+            if !mode.name.is_empty()
+                && mode.name != number.to_string()
+                && mode.name != format!("mode {number}") =>
+        {
+            format!("mode {number}: {}", mode.name)
+        }
+        _ => format!("mode {number}"),
+    }
+}
+
 fn unit_of(signals: &[Signal], index: usize) -> Option<&str> {
     signals.get(index).and_then(|signal| signal.unit.as_deref())
 }
@@ -105,7 +121,8 @@ pub fn page(design: &Design, trajectories: &[Trajectory], warnings: &[String]) -
     if !disturbances.is_empty() {
         sections.push(Section::new("Disturbance").figures(disturbances));
     }
-    sections.push(Section::new("Design").with(Block::Facts(facts::facts(design))));
+    let report = summary::sections(design).into_iter();
+    sections.extend(report.map(|(title, lines)| Section::new(title).with(Block::Facts(lines))));
     sections.push(
         Section::new("Modes and sensors")
             .with(Block::Table(tables::modes(design)))

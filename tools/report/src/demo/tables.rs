@@ -51,7 +51,7 @@ pub fn merits(design: &Design, trajectories: &[Trajectory]) -> Table {
         rows,
         notes: vec![
             "True: the output of the plant. Measured: what its sensor says, fault and noise included; integral action makes \
-             a lying sensor follow the reference well, which is why a small measured error alone proves nothing. VAF \
+             a faulty sensor follow the reference well, which is why a small measured error alone proves nothing. VAF \
              compares variances, so it is 0 where the output hardly varies and does not see a constant offset."
                 .into(),
         ],
@@ -109,7 +109,7 @@ pub fn modes(design: &Design) -> Table {
         .enumerate()
         .map(|(index, mode)| {
             vec![
-                super::facts::mode_name(modes, index),
+                super::mode_name(modes, index),
                 number(mode.spectral_radius()),
             ]
         })

@@ -71,7 +71,7 @@ fn lead_over_mpc(trial: &Trial) -> f64 {
     vaf(trial, Variant::Ftc) - vaf(trial, Variant::Predictive)
 }
 
-/// Faults under which the proposed controller is ahead by more than the noise is worth.
+/// Faults under which the proposed controller is ahead by more than the noise explains.
 fn ahead(trials: &[Trial]) -> usize {
     let clear = |trial: &&Trial| lead_over_mpc(trial) > noise_worth(trial);
     faulty(trials).filter(clear).count()

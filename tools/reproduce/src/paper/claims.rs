@@ -246,7 +246,7 @@ fn metrics(record: &Record) -> Claim {
             number(measured),
             number(truth)
         ),
-        "integral action makes a lying sensor follow the reference; what is wrong is the plant. Both are given \
+        "integral action makes a faulty sensor follow the reference; what is wrong is the plant. Both are given \
          here, and compared is the true one",
     )
 }
