@@ -223,6 +223,7 @@ pub fn state_based(mut parameters: ControllerParameters) -> ControllerParameters
         inputs: signals("u", dims.inputs),
         outputs: signals("y", dims.outputs),
         states: signals("x", dims.states),
+        disturbances: signals("w", dims.disturbances),
     };
     let known = KnownDisturbance {
         period: core::f64::consts::TAU / 0.02,
