@@ -126,7 +126,7 @@ fn a_dwell_time_that_is_too_short_is_refused() {
 fn a_damaged_observer_is_refused() {
     for (plant, synthesis) in all() {
         let mut gain = synthesis.observer.clone();
-        gain.observer.gains[0].0 *= 5.0;
+        gain.observer.gains[0] = gain.observer.gains[0].clone().scaled(5.0);
         gain.verify(&plant).unwrap_err();
         let mut decay = synthesis.observer.clone();
         decay.spec.decay = 1e-12;

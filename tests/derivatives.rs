@@ -9,13 +9,12 @@ mod common;
 
 use common::{Channel, controller, plant, reference, scenario, state_based};
 use ftc_control::parameters::{Compensation, EstimatorMethod, Limits, Transfer};
-use ftc_control::{Compensate, Controller, ControllerParameters, ControllerState, Sample};
+use ftc_control::{Compensate, Controller, ControllerParameters, ControllerState, Matrix};
 use ftc_plant::rectifier::Rectifier;
 use ftc_plant::scenario::{FaultEvent, FaultKind, ModeInterval, Waveform};
-use ftc_plant::{Scenario, Truth};
+use ftc_plant::{Scenario, TruePlant};
 use ftc_simulate::plant::{Change, External};
 use ftc_simulate::{PlantSimulator, PlantState};
-use nalgebra::DMatrix;
 use proptest::prelude::*;
 
 /// Half the distance of the differences.
@@ -60,7 +59,7 @@ fn parameters(design: Design) -> ControllerParameters {
     let mut parameters = controller(Channel::State, 0.005);
     parameters.compensation = design.compensation;
     if design.method == EstimatorMethod::Observer {
-        parameters = state_based(parameters);
+        parameters = state_based(Channel::State, 0.005);
     }
     parameters.estimator.method = design.method;
     parameters.estimator.adapt = design.adapt;
@@ -71,7 +70,7 @@ fn parameters(design: Design) -> ControllerParameters {
     });
     if design.latency == 1 {
         for gains in &mut parameters.feedback.modes {
-            gains.previous_input = DMatrix::from_element(2, 2, -0.2);
+            gains.previous_input = Matrix::from_rows(&[[-0.2; 2]; 2]);
         }
     }
     if design.limited {
@@ -123,8 +122,7 @@ proptest! {
         reference in prop::array::uniform2(-1.0..1.0f64),
         believe in prop::array::uniform2(any::<bool>()),
     ) {
-        let controller = Controller::new(parameters(design));
-        let thresholds = controller.parameters().estimator.thresholds.clone();
+        let controller = Controller::new(parameters(design)).unwrap();
         let mut state = controller.initial_state(0);
         let mut x = [0.0; 2];
         let mut last = None;
@@ -142,9 +140,7 @@ proptest! {
             let believes = believe[usize::from(tick == ticks)];
             let compensate = if believes { Compensate::Nothing } else { Compensate::Estimate };
             let sample = |y: &[f64; 2], reference: &[f64; 2], state: &mut ControllerState, derive: Option<ftc_control::Change<'_>>| {
-                let sample = Sample {
-                    tick, mode, measurement: y, reference, thresholds: &thresholds, compensate,
-                };
+                let sample = controller.sample(tick, mode, y, reference).unwrap().compensating(compensate).unwrap();
                 match derive {
                     Some(change) => controller.differentiate(state, &sample, change),
                     None => controller.tick(state, &sample),
@@ -219,7 +215,8 @@ fn rectifier() -> (PlantSimulator, [f64; 2]) {
         disturbance: vec![Waveform::Constant { value: 1.0 }],
         ..scenario(reference("constant"), 0.0, 1)
     };
-    let simulator = PlantSimulator::with_truth(plant, Truth::Rectifier(rectifier), scenario);
+    let simulator =
+        PlantSimulator::with_true_plant(plant, TruePlant::Rectifier(rectifier), scenario);
     (simulator, [12.0, -3.0])
 }
 

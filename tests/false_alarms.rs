@@ -21,15 +21,15 @@ fn no_healthy_sensor_is_accused() {
     let mut samples = 0;
     for plant in 0..PLANTS {
         let mut design = design(&mut dice);
-        let te = design.controller.plant.sample_time;
+        let te = design.plant.sample_time;
         design.scenario.schedule = (0..STEPS / EVERY)
             .map(|k| ModeInterval {
                 from: (k * EVERY) as f64 * te,
                 mode: (k % 2) as usize,
             })
             .collect();
-        let simulator = PlantSimulator::new(design.controller.plant.clone(), design.scenario);
-        let controller = Controller::new(design.controller);
+        let simulator = PlantSimulator::new(design.plant.clone(), design.scenario.clone());
+        let controller = Controller::new(design.parameters()).unwrap();
         let trajectory = run(&simulator, &controller, Variant::Ftc);
         for record in &trajectory.records {
             assert!(

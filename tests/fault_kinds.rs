@@ -100,8 +100,8 @@ fn run_with_noise(events: &[FaultEvent], variant: Variant, noise: f64) -> Trajec
     let mut scenario = scenario(reference("levels"), noise, 1);
     scenario.fault = vec![Waveform::ZERO; 2];
     scenario.events = events.to_vec();
-    let plant = PlantSimulator::new(parameters.plant.clone(), scenario);
-    run(&plant, &Controller::new(parameters), variant)
+    let plant = PlantSimulator::new(common::plant(Channel::State), scenario);
+    run(&plant, &Controller::new(parameters).unwrap(), variant)
 }
 
 /// Largest distance of the true outputs of two runs over the ticks that `judged` admits.

@@ -11,11 +11,8 @@ use ftc_simulate::{PlantSimulator, Trajectory, Variant, run};
 
 fn simulate(channel: Channel, name: &str, noise: f64, variant: Variant) -> Trajectory {
     let parameters = controller(channel, noise);
-    let plant = PlantSimulator::new(
-        parameters.plant.clone(),
-        scenario(reference(name), noise, 1),
-    );
-    run(&plant, &Controller::new(parameters), variant)
+    let plant = PlantSimulator::new(common::plant(channel), scenario(reference(name), noise, 1));
+    run(&plant, &Controller::new(parameters).unwrap(), variant)
 }
 
 fn true_error(trajectory: &Trajectory) -> f64 {

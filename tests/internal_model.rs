@@ -84,7 +84,7 @@ fn design(channel: Channel, control: ControlSpec) -> Design {
             disturbance: Some(disturbance(1)),
         },
         compensation: Compensation::VirtualSensor,
-        truth: ftc_plant::Truth::AsDesigned,
+        true_plant: ftc_plant::TruePlant::AsDesigned,
         scenario: scenario(reference("sine"), 0.0, 1),
         control,
     })
@@ -99,7 +99,7 @@ fn a_sine_is_followed_to_99_7_percent_and_with_the_internal_model_to_99_95() {
             let simulator = PlantSimulator::new(plant(channel), design.scenario.clone());
             let merits = run(
                 &simulator,
-                &Controller::new(design.controller),
+                &Controller::new(design.parameters()).unwrap(),
                 Variant::Ftc,
             )
             .merits(&[0, 1]);
@@ -131,7 +131,7 @@ fn residual(control: &ControlSpec, angle: f64) -> f64 {
     let simulator = PlantSimulator::new(plant(Channel::State), played);
     let trajectory = run(
         &simulator,
-        &Controller::new(design.controller),
+        &Controller::new(design.parameters()).unwrap(),
         Variant::NoFtc,
     );
     let window = (10.0 * TAU / angle).round() as usize;

@@ -16,7 +16,7 @@ use ftc_design::{
     commissioning,
 };
 use ftc_plant::SwitchedPlant;
-use ftc_plant::Truth;
+use ftc_plant::TruePlant;
 use ftc_plant::noise::standard_normal;
 use ftc_simulate::{PlantSimulator, Variant, run};
 
@@ -79,7 +79,7 @@ fn design(model: &SwitchedPlant, truth: &SwitchedPlant, noise: f64) -> Design {
             disturbances: Vec::new(),
         },
         plant: model.clone(),
-        truth: ftc_plant::Truth::AsDesigned,
+        true_plant: ftc_plant::TruePlant::AsDesigned,
         control,
         bumpless: false,
         feedforward: true,
@@ -120,12 +120,13 @@ fn as_good_as_being_told_the_fault_with_matrices_wrong_by_a_tenth() {
         for draw in 0..DRAWS {
             let model = disturbed(&truth, draw);
             for noise in [0.0, 0.005] {
-                let controller = Controller::new(design(&model, &truth, noise).controller);
+                let controller =
+                    Controller::new(design(&model, &truth, noise).parameters()).unwrap();
                 for name in REFERENCES {
-                    let truth = Truth::Linear {
+                    let truth = TruePlant::Linear {
                         plant: truth.clone(),
                     };
-                    let simulator = PlantSimulator::with_truth(
+                    let simulator = PlantSimulator::with_true_plant(
                         model.clone(),
                         truth,
                         scenario(reference(name), noise, 1),

@@ -6,7 +6,7 @@ mod common;
 
 use common::{Channel, controller, reference, scenario};
 use ftc_control::parameters::Transfer;
-use ftc_control::{Compensate, Controller, ControllerState, Sample};
+use ftc_control::{Controller, ControllerState};
 use ftc_simulate::{PlantSimulator, Variant, run};
 use proptest::prelude::*;
 
@@ -18,14 +18,7 @@ fn tick(
     y: &[f64],
     reference: &[f64],
 ) {
-    let sample = Sample {
-        tick,
-        mode,
-        measurement: y,
-        reference,
-        thresholds: &controller.parameters().estimator.thresholds,
-        compensate: Compensate::Estimate,
-    };
+    let sample = controller.sample(tick, mode, y, reference).unwrap();
     controller.tick(state, &sample);
 }
 
@@ -46,7 +39,7 @@ fn outputs(state: &ControllerState) -> Vec<f64> {
 
 #[test]
 fn a_tick_allocates_nothing() {
-    let controller = Controller::new(controller(Channel::State, 0.005));
+    let controller = Controller::new(controller(Channel::State, 0.005)).unwrap();
     let mut state = controller.initial_state(0);
     let counted = allocation_counter::measure(|| {
         for k in 0..2000_u64 {
@@ -70,10 +63,10 @@ fn a_tick_allocates_nothing() {
 fn the_same_inputs_give_the_same_bits_and_a_copy_is_a_snapshot() {
     let parameters = controller(Channel::State, 0.005);
     let plant = PlantSimulator::new(
-        parameters.plant.clone(),
+        common::plant(Channel::State),
         scenario(reference("levels"), 0.005, 1),
     );
-    let controller = Controller::new(parameters);
+    let controller = Controller::new(parameters).unwrap();
     assert_eq!(
         run(&plant, &controller, Variant::Ftc),
         run(&plant, &controller, Variant::Ftc)
@@ -112,7 +105,7 @@ fn a_bumpless_switch_leaves_the_command_where_it_was() {
     ] {
         let mut parameters = controller(Channel::State, 0.0);
         parameters.feedback.transfer = transfer;
-        let controller = Controller::new(parameters);
+        let controller = Controller::new(parameters).unwrap();
         let mut state = controller.initial_state(0);
         let mut jump = |k: u64, mode: usize| {
             let before = state.command.clone();
@@ -141,9 +134,9 @@ proptest! {
     /// Any bit pattern as measurement, any finite reference, any mode: every output stays finite.
     #[test]
     fn finite_whatever_the_sensors_say(
-        samples in prop::collection::vec((any::<u64>(), any::<u64>(), -1e300..1e300f64, 0usize..3), 1..120),
+        samples in prop::collection::vec((any::<u64>(), any::<u64>(), -1e300..1e300f64, 0usize..2), 1..120),
     ) {
-        let controller = Controller::new(controller(Channel::State, 0.005));
+        let controller = Controller::new(controller(Channel::State, 0.005)).unwrap();
         let mut state = controller.initial_state(0);
         for (k, (first, second, target, mode)) in samples.into_iter().enumerate() {
             let y = [f64::from_bits(first), f64::from_bits(second)];
@@ -163,12 +156,71 @@ proptest! {
             sensor, from: from as f64, until: (from + length) as f64,
             kind: ftc_plant::scenario::FaultKind::Dropout,
         }];
-        let plant = PlantSimulator::new(parameters.plant.clone(), scenario);
-        let lost = run(&plant, &Controller::new(parameters), Variant::Ftc);
+        let plant = PlantSimulator::new(common::plant(Channel::State), scenario);
+        let lost = run(&plant, &Controller::new(parameters).unwrap(), Variant::Ftc);
         for record in &lost.records[60..] {
             for output in 0..2 {
                 prop_assert!((record.y_true[output] - 0.6).abs() < 0.03, "tick {}: {:?}", record.tick, record.y_true);
             }
         }
     }
+}
+
+/// What does not fit is refused where it is made, by the name of the field.
+#[test]
+fn wrong_sizes_are_refused_by_field() {
+    use ftc_control::{ControllerError, ControllerParameters, Matrix, SampleError};
+    let damage: [(&str, fn(&mut ControllerParameters)); 9] = [
+        ("modes[1].b", |p| p.modes[1].b = Matrix::zeros(2, 1)),
+        ("modes[0].x0", |p| p.modes[0].x0[0] = f64::NAN),
+        ("feedback.tracked", |p| p.feedback.tracked = vec![0, 2]),
+        ("feedback.modes[1].anti_windup", |p| {
+            p.feedback.modes[1].anti_windup = Matrix::zeros(2, 3);
+        }),
+        ("observer.gains", |p| p.observer.gains.clear()),
+        ("estimator.thresholds", |p| p.estimator.thresholds.clear()),
+        ("estimator.largest_fault", |p| {
+            p.estimator.largest_fault.push(1.0)
+        }),
+        ("estimator.predictors[0].factor", |p| {
+            p.estimator.predictors[0].factor = Matrix::identity(3);
+        }),
+        ("input_limits", |p| p.input_limits.truncate(1)),
+    ];
+    for (field, damage) in damage {
+        let mut parameters = controller(Channel::State, 0.0);
+        damage(&mut parameters);
+        let error = Controller::new(parameters).unwrap_err();
+        let named = match &error {
+            ControllerError::Length { field, .. }
+            | ControllerError::Shape { field, .. }
+            | ControllerError::NotFinite { field }
+            | ControllerError::Range { field, .. } => field,
+            other => panic!("{other}"),
+        };
+        assert_eq!(named, field, "{error}");
+    }
+    let controller = Controller::new(controller(Channel::State, 0.0)).unwrap();
+    let wrong = |y: &[f64], reference: &[f64], mode| {
+        controller
+            .sample(0, mode, y, reference)
+            .map(drop)
+            .unwrap_err()
+    };
+    let length = |signal, found| SampleError::Length {
+        signal,
+        found,
+        needed: 2,
+    };
+    assert_eq!(wrong(&[1.0], &[0.0; 2], 0), length("measurement", 1));
+    assert_eq!(wrong(&[1.0; 2], &[0.0; 3], 0), length("reference", 3));
+    assert_eq!(
+        wrong(&[1.0; 2], &[0.0; 2], 2),
+        SampleError::Mode { mode: 2, modes: 2 }
+    );
+    let sample = controller.sample(0, 0, &[0.0; 2], &[0.0; 2]).unwrap();
+    assert_eq!(
+        sample.with_thresholds(&[1.0]).unwrap_err(),
+        length("thresholds", 1)
+    );
 }

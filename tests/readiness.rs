@@ -31,8 +31,12 @@ fn play(
         until,
         kind,
     }];
-    let plant = PlantSimulator::new(parameters.plant.clone(), scenario);
-    run(&plant, &Controller::new(parameters.clone()), variant)
+    let plant = PlantSimulator::new(common::plant(Channel::State), scenario);
+    run(
+        &plant,
+        &Controller::new(parameters.clone()).unwrap(),
+        variant,
+    )
 }
 
 /// With and without a known size of the disturbance.

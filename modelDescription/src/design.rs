@@ -38,7 +38,7 @@ fn disturbances(design: &Design, count: usize) -> Vec<SignalInfo> {
 
 impl From<&Design> for Interface {
     fn from(design: &Design) -> Self {
-        let plant = &design.controller.plant;
+        let plant = &design.plant;
         let sample_time = plant.sample_time;
         let first = design.scenario.mode(0, sample_time);
         let point = plant.modes.get(first).map(|mode| &mode.operating_point);

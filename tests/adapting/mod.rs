@@ -4,7 +4,7 @@
 use crate::random_plants::{Dice, design};
 use ftc_control::Controller;
 use ftc_design::Design;
-use ftc_plant::Truth;
+use ftc_plant::TruePlant;
 use ftc_plant::scenario::{FaultEvent, FaultKind, ModeInterval};
 use ftc_simulate::{PlantSimulator, Trajectory, Variant, run};
 
@@ -12,7 +12,7 @@ pub const STEPS: u64 = 6000;
 
 /// Six faults of random kind, sensor, size and time.
 pub fn with_faults(design: &mut Design, dice: &mut Dice) {
-    let te = design.controller.plant.sample_time;
+    let te = design.plant.sample_time;
     let sensors = design.controller.estimator.thresholds.len();
     design.scenario.steps = STEPS;
     design.scenario.schedule = (0..3)
@@ -49,14 +49,14 @@ pub fn with_faults(design: &mut Design, dice: &mut Dice) {
 
 /// The loop's run with or without adaptation.
 pub fn play(design: &Design, adapt: bool, variant: Variant) -> Trajectory {
-    let mut parameters = design.controller.clone();
+    let mut parameters = design.parameters();
     parameters.estimator.adapt = adapt;
-    let plant = PlantSimulator::with_truth(
-        parameters.plant.clone(),
-        design.truth.clone(),
+    let plant = PlantSimulator::with_true_plant(
+        design.plant.clone(),
+        design.true_plant.clone(),
         design.scenario.clone(),
     );
-    run(&plant, &Controller::new(parameters), variant)
+    run(&plant, &Controller::new(parameters).unwrap(), variant)
 }
 
 /// Sum of the true mean square errors.
@@ -87,17 +87,17 @@ pub fn ratio(design: &Design) -> f64 {
 
 /// Changes the gains of all inputs of the true plant by a factor.
 pub fn change_gains(design: &mut Design, factor: f64) {
-    let mut plant = design.controller.plant.clone();
+    let mut plant = design.plant.clone();
     for mode in &mut plant.modes {
         mode.b *= factor;
     }
-    design.truth = Truth::Linear { plant };
+    design.true_plant = TruePlant::Linear { plant };
 }
 
 /// Whether the loop itself bears the change: the same gains told the fault do as well as before.
 pub fn bears(design: &Design) -> bool {
     let unchanged = Design {
-        truth: Truth::AsDesigned,
+        true_plant: TruePlant::AsDesigned,
         ..design.clone()
     };
     let [changed, before] = [design, &unchanged]

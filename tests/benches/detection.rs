@@ -36,13 +36,13 @@ struct Tally {
 }
 
 fn healthy(design: &Design, tally: &mut Tally) {
-    let te = design.controller.plant.sample_time;
+    let te = design.plant.sample_time;
     let mut scenario = design.scenario.clone();
     scenario.schedule = schedule(te, scenario.steps, 5_000);
-    let plant = PlantSimulator::new(design.controller.plant.clone(), scenario);
+    let plant = PlantSimulator::new(design.plant.clone(), scenario);
     let trajectory = run(
         &plant,
-        &Controller::new(design.controller.clone()),
+        &Controller::new(design.parameters()).unwrap(),
         Variant::Ftc,
     );
     tally.healthy_samples += trajectory.records.len() as u64;
@@ -76,7 +76,7 @@ fn kind(dice: &mut Dice, index: usize, te: f64, threshold: f64) -> (&'static str
 }
 
 fn faulty(design: &Design, dice: &mut Dice, index: usize, tally: &mut Tally) {
-    let te = design.controller.plant.sample_time;
+    let te = design.plant.sample_time;
     let sensors = design.controller.estimator.thresholds.len();
     let sensor = dice.count(0, sensors - 1);
     let hold = design.controller.estimator.response_length as u64;
@@ -96,10 +96,10 @@ fn faulty(design: &Design, dice: &mut Dice, index: usize, tally: &mut Tally) {
         until: until as f64 * te,
         kind,
     }];
-    let plant = PlantSimulator::new(design.controller.plant.clone(), scenario);
+    let plant = PlantSimulator::new(design.plant.clone(), scenario);
     let trajectory = run(
         &plant,
-        &Controller::new(design.controller.clone()),
+        &Controller::new(design.parameters()).unwrap(),
         Variant::Ftc,
     );
     let window = &trajectory.records[from as usize..until as usize];

@@ -1,14 +1,15 @@
 //! The paper's example, built by hand: plant, scenario and a controller with fixed gains.
 #![allow(dead_code, missing_docs)]
 
-use ftc_control::ControllerParameters;
 use ftc_control::parameters::{
-    Compensation, Estimator, EstimatorMethod, FeedbackGains, Gain, Harmonics, Limits, Observer,
+    Compensation, Estimator, EstimatorMethod, FeedbackGains, Harmonics, Limits, Observer,
     ObserverKind, StateFeedback,
 };
+use ftc_control::{ControllerParameters, Matrix};
 use ftc_design::assembly::KnownDisturbance;
-use ftc_design::commissioning;
-use ftc_design::{HypothesesSpec, Signal, Signals};
+use ftc_design::{
+    ControllerDesign, HypothesesSpec, Signal, Signals, commissioning, mode_models, plain,
+};
 use ftc_plant::Scenario;
 use ftc_plant::scenario::{ModeInterval, Waveform};
 use ftc_plant::{Mode, OperatingPoint, SwitchedPlant};
@@ -105,15 +106,15 @@ pub fn scenario(reference: Waveform, noise: f64, disturbances: usize) -> Scenari
 }
 
 /// Gains from a linear-quadratic design, rounded by hand; an observer that forgets 80 % a sample.
-pub fn controller(channel: Channel, noise: f64) -> ControllerParameters {
+pub fn controller_design(channel: Channel, noise: f64) -> ControllerDesign {
     let plant = plant(channel);
     let gains = |state_feedback: DMatrix<f64>, integral: DMatrix<f64>| FeedbackGains {
-        output_feedback: state_feedback.clone(), // both states are measured
-        state_feedback,
-        feedforward: &integral * plant.sample_time,
-        integral,
-        previous_input: DMatrix::zeros(2, 0),
-        anti_windup: DMatrix::zeros(2, 2),
+        output_feedback: plain(&state_feedback), // both states are measured
+        state_feedback: plain(&state_feedback),
+        feedforward: plain(&(&integral * plant.sample_time)),
+        integral: plain(&integral),
+        previous_input: Matrix::zeros(2, 0),
+        anti_windup: Matrix::zeros(2, 2),
     };
     let decoupling = match channel {
         Channel::State => DMatrix::from_element(2, 2, 0.5),
@@ -135,7 +136,7 @@ pub fn controller(channel: Channel, noise: f64) -> ControllerParameters {
         .iter()
         .map(|mode| {
             let t = DMatrix::identity(2, 2) - &decoupling * &mode.c;
-            Gain(t * &mode.a * 0.8)
+            plain(&(t * &mode.a * 0.8))
         })
         .collect();
     let thresholds = (0..2)
@@ -146,7 +147,7 @@ pub fn controller(channel: Channel, noise: f64) -> ControllerParameters {
                 .fold(1e-3, f64::max)
         })
         .collect();
-    ControllerParameters {
+    ControllerDesign {
         feedback: StateFeedback {
             tracked: vec![0, 1],
             latency: 0,
@@ -171,7 +172,7 @@ pub fn controller(channel: Channel, noise: f64) -> ControllerParameters {
             },
             note: None,
             gains: observer_gains,
-            decoupling: vec![vec![Gain(decoupling.clone()); 2]; 2],
+            decoupling: vec![vec![plain(&decoupling); 2]; 2],
             lost: Vec::new(),
             minimum_dwell: 0,
         },
@@ -201,13 +202,29 @@ pub fn controller(channel: Channel, noise: f64) -> ControllerParameters {
         },
         compensation: Compensation::VirtualSensor,
         input_limits: vec![Limits::default(); 2],
-        plant,
+    }
+}
+
+/// That controller with the plant it is for.
+pub fn controller(channel: Channel, noise: f64) -> ControllerParameters {
+    let plant = plant(channel);
+    let design = controller_design(channel, noise);
+    ControllerParameters {
+        sample_time: plant.sample_time,
+        modes: mode_models(&plant),
+        feedback: design.feedback,
+        observer: design.observer,
+        estimator: design.estimator,
+        compensation: design.compensation,
+        input_limits: design.input_limits,
     }
 }
 
 /// The same controller with the state-based estimator.
 #[allow(dead_code)]
-pub fn state_based(mut parameters: ControllerParameters) -> ControllerParameters {
+pub fn state_based(channel: Channel, noise: f64) -> ControllerParameters {
+    let mut parameters = controller(channel, noise);
+    let plant = plant(channel);
     let signals = |name: &str, count: usize| -> Vec<Signal> {
         let signal = |at| Signal {
             name: format!("{name}[{at}]"),
@@ -218,7 +235,7 @@ pub fn state_based(mut parameters: ControllerParameters) -> ControllerParameters
         };
         (1..=count).map(signal).collect()
     };
-    let dims = parameters.plant.dimensions();
+    let dims = plant.dimensions();
     let signals = Signals {
         inputs: signals("u", dims.inputs),
         outputs: signals("y", dims.outputs),
@@ -230,9 +247,8 @@ pub fn state_based(mut parameters: ControllerParameters) -> ControllerParameters
         harmonics: 1,
         amplitude: None,
     };
-    let settings = HypothesesSpec::default().settings(&parameters.plant, &signals, Some(&known));
+    let settings = HypothesesSpec::default().settings(&plant, &signals, Some(&known));
     parameters.estimator.method = EstimatorMethod::Observer;
-    parameters.estimator.largest_fault = settings.authority.clone();
     parameters.estimator.hypotheses = Some(settings);
     parameters
 }

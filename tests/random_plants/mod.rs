@@ -147,7 +147,7 @@ pub fn design_with(dice: &mut Dice, method: EstimatorMethod) -> Design {
                 }),
             },
             compensation: Compensation::VirtualSensor,
-            truth: ftc_plant::Truth::AsDesigned,
+            true_plant: ftc_plant::TruePlant::AsDesigned,
             scenario,
         };
         if let Ok(design) = assemble(request) {

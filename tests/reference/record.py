@@ -59,21 +59,21 @@ def _modes(plant: dict) -> list[Mode]:
 
 def modes(design: dict) -> list[Mode]:
     """Returns the modes that the controller was designed for."""
-    return _modes(design["controller"]["plant"])
+    return _modes(design["plant"])
 
 
 def true_modes(design: dict) -> list[Mode]:
     """Returns the modes of the simulated plant, which a scenario may set apart from the design's."""
-    truth = design["truth"]
-    match truth["kind"]:
+    true_plant = design["true_plant"]
+    match true_plant["kind"]:
         case "as-designed":
             return modes(design)
         case "linear":
-            return _modes(truth["plant"])
+            return _modes(true_plant["plant"])
         case nonlinear:
             raise ValueError(nonlinear)
 
 
 def sample_time(design: dict) -> float:
     """Returns Te in seconds."""
-    return design["controller"]["plant"]["sample_time"]
+    return design["plant"]["sample_time"]

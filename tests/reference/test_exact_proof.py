@@ -92,7 +92,7 @@ def test_gains_below_the_norm_are_not_proved(example: dict) -> None:
 def error_maps(design: dict, lost: dict, exact: bool) -> list[np.ndarray]:  # noqa: FBT001
     """Returns A - A H C of every mode for a set of lost sensors."""
     numbers = rationals if exact else np.array
-    modes = design["controller"]["plant"]["modes"]
+    modes = design["plant"]["modes"]
     parts = [(numbers(mode["a"]), numbers(H), numbers(mode["c"])) for mode, H in zip(modes, lost["correction"], strict=True)]
     return [A - A @ H @ C for A, H, C in parts]
 

@@ -63,7 +63,7 @@ def random_design(seed: int) -> dict:
 
 def check_claims(design: dict) -> list[float]:
     """Holds every claim about the running loop against the loop; returns claimed over computed."""
-    modes = design["controller"]["plant"]["modes"]
+    modes = design["plant"]["modes"]
     claims = design["synthesis"]["running_loop"]
     ratios = []
     for index in range(len(modes)):
@@ -91,7 +91,7 @@ def check_claims(design: dict) -> list[float]:
 
 def check_table(design: dict) -> int:
     """Holds the table of lost sensors against the plant and the loops; returns how many sets are served."""
-    plant = design["controller"]["plant"]
+    plant = design["plant"]
     table = design["synthesis"]["running_loop"]["lost"]
     served = {tuple(entry["sensors"]): entry for entry in design["controller"]["observer"]["lost"]}
     p = len(plant["modes"][0]["c"])
@@ -127,7 +127,7 @@ def test_examples_keep_their_claims(example: dict) -> None:
 
 def test_examples_serve_what_they_say(example: dict) -> None:
     """The table of lost sensors of every example; of stable plants every set is served."""
-    stable = all(np.abs(np.linalg.eigvals(mode["a"])).max() < 1 for mode in example["controller"]["plant"]["modes"])
+    stable = all(np.abs(np.linalg.eigvals(mode["a"])).max() < 1 for mode in example["plant"]["modes"])
     served = check_table(example)
     if stable:
         assert served == len(example["synthesis"]["running_loop"]["lost"])
@@ -135,7 +135,7 @@ def test_examples_serve_what_they_say(example: dict) -> None:
 
 def simulate(design: dict, lost: dict | None, switching: np.ndarray, sets: np.ndarray | None = None) -> float:
     """Returns the largest l2 ratio of performance to disturbance over a run from rest; `sets` says when `lost` holds."""
-    modes = len(design["controller"]["plant"]["modes"])
+    modes = len(design["plant"]["modes"])
     healthy = [channels(design, i).disturbance for i in range(modes)]
     without = [channels(design, i, lost).disturbance for i in range(modes)] if lost else healthy
     rng = np.random.default_rng(3)
@@ -153,7 +153,7 @@ def simulate(design: dict, lost: dict | None, switching: np.ndarray, sets: np.nd
 
 def check_runs(design: dict) -> None:
     """No simulated disturbance exceeds a claim; with sensors lost a run stays bounded where that is proved."""
-    claims, modes = design["synthesis"]["running_loop"], len(design["controller"]["plant"]["modes"])
+    claims, modes = design["synthesis"]["running_loop"], len(design["plant"]["modes"])
     for mode in range(modes):
         assert simulate(design, None, np.full(400, mode)) <= claims["gamma_loop"][mode]
     rng = np.random.default_rng(5)

@@ -79,19 +79,19 @@ impl ControllerFmu {
         require_finite(&self.table, values, self.spans.threshold)
     }
 
-    fn sample<'a>(&self, values: &'a Values, tick: u64) -> Sample<'a> {
-        Sample {
-            tick,
-            mode: self.mode(values),
-            measurement: values.get(self.spans.measurement),
-            reference: values.get(self.spans.reference),
-            thresholds: values.get(self.spans.threshold),
-            compensate: if values.flag(self.spans.ftc_enabled) {
-                Compensate::Estimate
-            } else {
-                Compensate::Nothing
-            },
-        }
+    fn sample<'a>(&'a self, values: &'a Values, tick: u64) -> Result<Sample<'a>, Refusal> {
+        let measurement = values.get(self.spans.measurement);
+        let reference = values.get(self.spans.reference);
+        let compensate = if values.flag(self.spans.ftc_enabled) {
+            Compensate::Estimate
+        } else {
+            Compensate::Nothing
+        };
+        self.controller
+            .sample(tick, self.mode(values), measurement, reference)
+            .and_then(|sample| sample.with_thresholds(values.get(self.spans.threshold)))
+            .and_then(|sample| sample.compensating(compensate))
+            .map_err(|error| Refusal(error.to_string()))
     }
 
     fn publish(&self, state: &ControllerState, values: &mut Values) {
@@ -128,9 +128,9 @@ impl Slave for ControllerFmu {
         let bytes = resource::read_verified(resources, DESIGN_FILE, CONTROLLER, guid)?;
         let design = model_description::read_design(&bytes)?;
         let table = model_description::controller(&Interface::from(&design));
-        let modes = 0..design.controller.plant.modes.len();
-        let first_mode = design.scenario.mode(0, design.controller.plant.sample_time);
-        let controller = Controller::new(design.controller);
+        let modes = 0..design.plant.modes.len();
+        let first_mode = design.scenario.mode(0, design.plant.sample_time);
+        let controller = Controller::new(design.parameters()).map_err(|error| error.to_string())?;
         Ok(Self {
             at_rest: modes.map(|mode| controller.initial_state(mode)).collect(),
             spans: Spans::of(&table),
@@ -145,7 +145,7 @@ impl Slave for ControllerFmu {
     }
 
     fn sample_time(&self) -> f64 {
-        self.controller.parameters().plant.sample_time
+        self.controller.parameters().sample_time
     }
 
     fn initial_state(&self) -> ControllerState {
@@ -180,7 +180,7 @@ impl Slave for ControllerFmu {
         if !fresh {
             self.controller.hold_readings(state);
         }
-        self.controller.tick(state, &self.sample(values, k));
+        self.controller.tick(state, &self.sample(values, k)?);
         self.publish(state, values);
         Ok(())
     }
@@ -202,7 +202,7 @@ impl Slave for ControllerFmu {
             Some(Event::Begin(k)) => k,
             Some(Event::End(k)) => k + 1,
         };
-        let sample = self.sample(values, k);
+        let sample = self.sample(values, k)?;
         let change = Change {
             measurement: seed.get(self.spans.measurement),
             reference: seed.get(self.spans.reference),

@@ -4,9 +4,9 @@
 mod common;
 
 use common::Channel;
-use ftc_control::{Compensate, Controller, Sample};
+use ftc_control::Controller;
 use ftc_design::{Design, FORMAT, Signal, Signals};
-use ftc_plant::Truth;
+use ftc_plant::TruePlant;
 use ftc_simulate::PlantSimulator;
 use ftc_simulate::plant::External;
 use model_description::{CONTROLLER, Interface, PLANT, VariableTable};
@@ -59,7 +59,7 @@ pub fn location(folder: &Path) -> String {
 
 /// The paper's example under noise, its modes switched at half time.
 pub fn example() -> Design {
-    let controller = common::controller(Channel::State, 0.005);
+    let controller = common::controller_design(Channel::State, 0.005);
     let signals = |base: &str| -> Vec<Signal> {
         let signal = |at| Signal {
             name: format!("{base}[{at}]"),
@@ -80,16 +80,17 @@ pub fn example() -> Design {
             disturbances: Vec::new(),
         },
         scenario: common::scenario(common::reference("square"), 0.005, 1),
+        plant: common::plant(Channel::State),
         controller,
-        truth: Truth::default(),
+        true_plant: TruePlant::default(),
         synthesis: None,
     }
 }
 
 /// Measurement and command of the native loop, controller first, at each of `ticks` ticks.
 pub fn native(design: &Design, ticks: usize) -> Vec<(Vec<f64>, Vec<f64>)> {
-    let controller = Controller::new(design.controller.clone());
-    let plant = PlantSimulator::new(design.controller.plant.clone(), design.scenario.clone());
+    let controller = Controller::new(design.parameters()).expect("the example fits its plant");
+    let plant = PlantSimulator::new(design.plant.clone(), design.scenario.clone());
     let (mut state, mut seen) = (controller.initial_state(0), plant.initial_state());
     let external = External {
         fault: &[0.0; 2],
@@ -99,14 +100,9 @@ pub fn native(design: &Design, ticks: usize) -> Vec<(Vec<f64>, Vec<f64>)> {
     };
     let tick = |_| {
         plant.observe(&mut seen, &external);
-        let sample = Sample {
-            tick: seen.tick,
-            mode: seen.mode,
-            measurement: &seen.y,
-            reference: &seen.reference,
-            thresholds: &design.controller.estimator.thresholds,
-            compensate: Compensate::Estimate,
-        };
+        let sample = controller
+            .sample(seen.tick, seen.mode, &seen.y, &seen.reference)
+            .expect("plant and controller have the same sizes");
         controller.tick(&mut state, &sample);
         let row = (seen.y.clone(), state.command.clone());
         plant

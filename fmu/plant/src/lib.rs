@@ -115,9 +115,9 @@ impl Slave for PlantFmu {
         let bytes = resource::read_verified(resources, DESIGN_FILE, PLANT, guid)?;
         let design = model_description::read_design(&bytes)?;
         let table = model_description::plant(&Interface::from(&design));
-        let plant = design.controller.plant;
+        let plant = design.plant;
         let modes = 0..plant.modes.len();
-        let simulator = PlantSimulator::with_truth(plant, design.truth, design.scenario);
+        let simulator = PlantSimulator::with_true_plant(plant, design.true_plant, design.scenario);
         Ok(Self {
             at_rest: modes.map(|mode| simulator.initial_state_in(mode)).collect(),
             spans: Spans::of(&table),

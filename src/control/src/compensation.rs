@@ -16,7 +16,9 @@
 //! error of `f_hat` for ever. It is there to be compared with.
 
 use super::kernel;
-use nalgebra::DMatrix;
+use crate::matrix::Matrix;
+use alloc::vec;
+use alloc::vec::Vec;
 use serde::{Deserialize, Serialize};
 
 /// Writes `measurement - fault` into `out`; a measurement that is not a number is replaced by `substitute`.
@@ -64,8 +66,8 @@ impl AdditiveControl {
     pub fn add_to(
         &mut self,
         command: &mut [f64],
-        static_gain: &DMatrix<f64>,
-        integral_gain: &DMatrix<f64>,
+        static_gain: &Matrix,
+        integral_gain: &Matrix,
         fault: &[f64],
     ) {
         self.control.fill(0.0);

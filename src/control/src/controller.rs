@@ -2,6 +2,8 @@
 
 mod derivative;
 
+use alloc::vec;
+use alloc::vec::Vec;
 pub use derivative::Change;
 
 use super::compensation::{self, AdditiveControl};
@@ -12,11 +14,12 @@ use super::kernel;
 use super::observer::{ObservedMode, ObserverState};
 use super::open_loop::OpenLoop;
 use super::parameters::{
-    Compensation, ControllerParameters, EstimatorMethod, FeedbackGains, Limits,
+    Compensation, ControllerParameters, EstimatorMethod, FeedbackGains, Limits, ModeModel,
 };
 use super::repetition::Repetition;
+use crate::check::{self, Sizes};
+use crate::error::{ControllerError, SampleError};
 use crate::state::State;
-use ftc_plant::OperatingPoint;
 use serde::{Deserialize, Serialize};
 
 /// A controller ready to run: immutable, shared by any number of [`ControllerState`]s.
@@ -24,25 +27,59 @@ use serde::{Deserialize, Serialize};
 pub struct Controller {
     parameters: ControllerParameters,
     modes: Vec<ObservedMode>,
+    sizes: Sizes,
     /// The state-based estimator, where it is chosen.
     bank: Option<Bank>,
 }
 
-/// What a tick is told.
+/// What a tick is told; made by [`Controller::sample`], which checks its sizes.
 #[derive(Clone, Copy, Debug)]
 pub struct Sample<'a> {
     /// Number of the tick, counted from the start time.
-    pub tick: u64,
-    /// Active mode (0-based); an unknown one is taken as the nearest known.
-    pub mode: usize,
+    tick: u64,
+    /// Active mode (0-based).
+    mode: usize,
     /// Measurement `y` (p); a value that is not finite is a fault of that sensor.
-    pub measurement: &'a [f64],
+    measurement: &'a [f64],
     /// Reference `y_ref` (r).
-    pub reference: &'a [f64],
+    reference: &'a [f64],
     /// Decision thresholds (p).
-    pub thresholds: &'a [f64],
+    thresholds: &'a [f64],
     /// Which fault to take out of the loop.
-    pub compensate: Compensate<'a>,
+    compensate: Compensate<'a>,
+}
+
+impl<'a> Sample<'a> {
+    /// The same sample judged by other thresholds (p, in output units).
+    ///
+    /// # Errors
+    /// There is not one threshold per sensor.
+    pub fn with_thresholds(self, thresholds: &'a [f64]) -> Result<Self, SampleError> {
+        has_length("thresholds", thresholds, self.measurement.len())?;
+        Ok(Self { thresholds, ..self })
+    }
+
+    /// The same sample with another fault taken out of the loop.
+    ///
+    /// # Errors
+    /// A known fault has not one entry per sensor.
+    pub fn compensating(self, compensate: Compensate<'a>) -> Result<Self, SampleError> {
+        if let Compensate::Known(fault) = compensate {
+            has_length("fault", fault, self.measurement.len())?;
+        }
+        Ok(Self { compensate, ..self })
+    }
+}
+
+fn has_length(signal: &'static str, values: &[f64], needed: usize) -> Result<(), SampleError> {
+    match values.len() == needed {
+        true => Ok(()),
+        false => Err(SampleError::Length {
+            signal,
+            found: values.len(),
+            needed,
+        }),
+    }
 }
 
 /// The fault that is taken out of the loop.
@@ -105,34 +142,62 @@ crate::state!(ControllerState {
 });
 
 impl Controller {
-    /// Prepares a controller; the parameters' sizes must agree with the plant's.
-    pub fn new(parameters: ControllerParameters) -> Self {
-        let modes = parameters
-            .plant
-            .modes
-            .iter()
-            .map(|mode| ObservedMode {
-                a: mode.a.clone(),
-                b: mode.b.clone(),
-                c: mode.c.clone(),
-                state_offset: mode.state_offset().iter().copied().collect(),
-                output_offset: mode.output_offset().iter().copied().collect(),
-            })
-            .collect();
+    /// Prepares a controller.
+    ///
+    /// # Errors
+    /// The first field whose size does not agree with the others, or whose numbers are not finite.
+    pub fn new(parameters: ControllerParameters) -> Result<Self, ControllerError> {
+        let sizes = check::check(&parameters)?;
+        let modes = parameters.modes.iter().map(ObservedMode::new).collect();
         let bank = match (
             parameters.estimator.method,
             &parameters.estimator.hypotheses,
         ) {
             (EstimatorMethod::Observer, Some(settings)) => {
-                Some(Bank::new(&parameters.plant, settings))
+                Some(Bank::new(&parameters.modes, settings))
             }
             _ => None,
         };
-        Self {
+        Ok(Self {
             parameters,
             modes,
             bank,
+            sizes,
+        })
+    }
+
+    /// What a tick is told: its number `tick` counted from the start time, the active `mode` (0-based),
+    /// the `measurement` (p; a value that is not finite is a fault of that sensor) and the `reference`
+    /// (r). Judged by the design's thresholds, and corrected by the fault estimate, unless
+    /// [`Sample::with_thresholds`] and [`Sample::compensating`] say otherwise.
+    ///
+    /// # Errors
+    /// A vector of another length, or a mode that does not exist.
+    pub fn sample<'a>(
+        &'a self,
+        tick: u64,
+        mode: usize,
+        measurement: &'a [f64],
+        reference: &'a [f64],
+    ) -> Result<Sample<'a>, SampleError> {
+        let Sizes { outputs, modes, .. } = self.sizes;
+        has_length("measurement", measurement, outputs)?;
+        has_length(
+            "reference",
+            reference,
+            self.parameters.feedback.tracked.len(),
+        )?;
+        if mode >= modes {
+            return Err(SampleError::Mode { mode, modes });
         }
+        Ok(Sample {
+            tick,
+            mode,
+            measurement,
+            reference,
+            thresholds: &self.parameters.estimator.thresholds,
+            compensate: Compensate::Estimate,
+        })
     }
 
     /// What this controller was built from.
@@ -141,23 +206,26 @@ impl Controller {
     }
 
     /// The state before the first tick in `mode` (0-based): at rest at its operating point.
+    ///
+    /// # Panics
+    /// There is no such mode.
     pub fn initial_state(&self, mode: usize) -> ControllerState {
-        let dims = self.parameters.plant.dimensions();
+        let dims = self.sizes;
         let tracked = self.parameters.feedback.tracked.len();
-        let point = &self.parameters.plant.modes[mode].operating_point;
+        let point = &self.parameters.modes[mode];
         ControllerState {
             mode: None,
             repetition: Repetition::new(dims.outputs),
-            observer: ObserverState::new(&point.x, dims.outputs),
-            open_loop: OpenLoop::new(&point.x, dims.outputs),
-            estimator: EstimatorState::new(&self.parameters.estimator, &point.u, dims.outputs),
+            observer: ObserverState::new(&point.x0, dims.outputs),
+            open_loop: OpenLoop::new(&point.x0, dims.outputs),
+            estimator: EstimatorState::new(&self.parameters.estimator, &point.u0, dims.outputs),
             bank: self.bank.as_ref().map(|bank| bank.start(mode)),
             integral: vec![0.0; self.parameters.feedback.integral_size()],
             additive: (self.parameters.compensation == Compensation::Additive)
                 .then(|| AdditiveControl::new(tracked, dims.inputs)),
-            command: point.u.clone(),
-            corrected: point.y.clone(),
-            acting: point.u.clone(),
+            command: point.u0.clone(),
+            corrected: point.y0.clone(),
+            acting: point.u0.clone(),
             deviation: vec![0.0; dims.states.max(dims.inputs)],
             offset: vec![0.0; dims.inputs],
             since: u32::MAX,
@@ -176,12 +244,10 @@ impl Controller {
     /// One tick: takes the sample and leaves the command in `state.command`.
     pub fn tick(&self, state: &mut ControllerState, sample: &Sample<'_>) {
         let mode = sample.mode.min(self.modes.len().saturating_sub(1));
-        let (Some(model), Some(described)) =
-            (self.modes.get(mode), self.parameters.plant.modes.get(mode))
+        let (Some(model), Some(point)) = (self.modes.get(mode), self.parameters.modes.get(mode))
         else {
             return;
         };
-        let point = &described.operating_point;
         let left = self.enter(state, mode, sample.thresholds);
         let settings = &self.parameters.estimator;
         let readings = state
@@ -194,8 +260,8 @@ impl Controller {
             let seen = Observation {
                 tick: sample.tick,
                 mode,
-                u0: &point.u,
-                y0: &point.y,
+                u0: &point.u0,
+                y0: &point.y0,
                 y: readings,
                 thresholds: sample.thresholds,
             };
@@ -282,7 +348,7 @@ impl Controller {
         &self,
         state: &mut ControllerState,
         mode: usize,
-        point: &OperatingPoint,
+        point: &ModeModel,
         reference: &[f64],
     ) {
         let Some(gains) = self.parameters.feedback.modes.get(mode) else {
@@ -305,7 +371,7 @@ impl Controller {
         &self,
         state: &mut ControllerState,
         mode: usize,
-        point: &OperatingPoint,
+        point: &ModeModel,
         sample: &Sample<'_>,
     ) {
         let Some(gains) = self.parameters.feedback.modes.get(mode) else {
@@ -326,7 +392,7 @@ impl Controller {
                 fault,
             );
             additive.advance(
-                self.parameters.plant.sample_time,
+                self.parameters.sample_time,
                 &self.parameters.feedback.tracked,
                 fault,
             );
@@ -343,19 +409,19 @@ impl Controller {
         &self,
         state: &mut ControllerState,
         gains: &FeedbackGains,
-        point: &OperatingPoint,
+        point: &ModeModel,
         reference: &[f64],
     ) {
-        kernel::copy(&mut state.command, &point.u);
-        kernel::difference(&mut state.deviation, &state.observer.estimate, &point.x);
+        kernel::copy(&mut state.command, &point.u0);
+        kernel::difference(&mut state.deviation, &state.observer.estimate, &point.x0);
         kernel::add_product(&mut state.command, &gains.state_feedback, &state.deviation);
         kernel::add_product(&mut state.command, &gains.integral, &state.integral);
         let targets = reference.iter().zip(&self.parameters.feedback.tracked);
         for (asked, (&target, &row)) in state.deviation.iter_mut().zip(targets) {
-            *asked = target - point.y.get(row).copied().unwrap_or(0.0);
+            *asked = target - point.y0.get(row).copied().unwrap_or(0.0);
         }
         kernel::add_product(&mut state.command, &gains.feedforward, &state.deviation);
-        kernel::difference(&mut state.deviation, &state.acting, &point.u);
+        kernel::difference(&mut state.deviation, &state.acting, &point.u0);
         kernel::add_product(&mut state.command, &gains.previous_input, &state.deviation);
         kernel::add_scaled(&mut state.command, 1.0, &state.offset);
     }
@@ -375,7 +441,7 @@ impl Controller {
         if let Some(gain) = self.parameters.observer.gains.get(mode) {
             state
                 .observer
-                .predict(&gain.0, model, &state.acting, &state.corrected);
+                .predict(gain, model, &state.acting, &state.corrected);
         }
         let settings = &self.parameters.estimator;
         if state.estimator.leans_on_the_model(settings) {
@@ -386,7 +452,7 @@ impl Controller {
         if let Some(gains) = feedback.modes.get(mode) {
             integrator::advance(
                 &mut state.integral,
-                self.parameters.plant.sample_time,
+                self.parameters.sample_time,
                 sample.reference,
                 &state.corrected,
                 feedback,

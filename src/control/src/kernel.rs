@@ -2,7 +2,7 @@
 //!
 //! Sums run column by column in a fixed order, so a result depends on its inputs alone.
 
-use nalgebra::DMatrix;
+use crate::matrix::Matrix;
 
 /// The largest magnitude any on-line quantity may take; far beyond physics, far below overflow.
 pub const LARGEST: f64 = 1e100;
@@ -32,15 +32,14 @@ pub fn bounded_change(value: f64, change: f64) -> f64 {
 }
 
 /// `out += matrix * vector`.
-pub fn add_product(out: &mut [f64], matrix: &DMatrix<f64>, vector: &[f64]) {
-    let rows = matrix.nrows().max(1);
-    for (column, &factor) in matrix.as_slice().chunks_exact(rows).zip(vector) {
+pub fn add_product(out: &mut [f64], matrix: &Matrix, vector: &[f64]) {
+    for (column, &factor) in matrix.columns().zip(vector) {
         add_scaled(out, factor, column);
     }
 }
 
 /// `out = start + matrix * vector`.
-pub fn affine(out: &mut [f64], start: &[f64], matrix: &DMatrix<f64>, vector: &[f64]) {
+pub fn affine(out: &mut [f64], start: &[f64], matrix: &Matrix, vector: &[f64]) {
     copy(out, start);
     add_product(out, matrix, vector);
 }
@@ -86,8 +85,9 @@ pub fn dot(left: &[f64], right: &[f64]) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use nalgebra::DVector;
+    use nalgebra::{DMatrix, DVector};
     use proptest::prelude::*;
+    use std::vec;
 
     proptest! {
         #[test]
@@ -98,7 +98,8 @@ mod tests {
             let matrix = DMatrix::from_fn(rows, columns, |r, c| entries[7 * r + c]);
             let vector = &x[..columns];
             let mut out = vec![1.0; rows];
-            add_product(&mut out, &matrix, vector);
+            let plain = Matrix::from_fn(rows, columns, |r, c| matrix[(r, c)]);
+            add_product(&mut out, &plain, vector);
             let expected = DVector::repeat(rows, 1.0) + &matrix * DVector::from_column_slice(vector);
             for (got, want) in out.iter().zip(expected.iter()) {
                 prop_assert!((got - want).abs() <= 1e-12 * (1.0 + want.abs()));

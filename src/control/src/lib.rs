@@ -9,11 +9,18 @@
 //! finite numbers come in, finite numbers go out, and the same inputs give the same bits: every
 //! transcendental function comes from `libm`, never from the platform.
 
+#![cfg_attr(not(test), no_std)]
+
+extern crate alloc;
+
+mod check;
 pub mod compensation;
 pub mod controller;
+mod error;
 pub mod estimator;
 pub mod integrator;
 pub mod kernel;
+mod matrix;
 pub mod observer;
 pub mod open_loop;
 pub mod parameters;
@@ -21,4 +28,6 @@ pub mod repetition;
 pub mod state;
 
 pub use controller::{Change, Compensate, Controller, ControllerState, Sample};
+pub use error::{ControllerError, SampleError};
+pub use matrix::{Matrix, UnequalRows};
 pub use parameters::ControllerParameters;

@@ -12,8 +12,10 @@
 //! mode just entered, and the estimate does not jump at a switch.
 
 use super::kernel;
-use super::parameters::Observer;
-use nalgebra::DMatrix;
+use super::parameters::{ModeModel, Observer};
+use crate::matrix::Matrix;
+use alloc::vec;
+use alloc::vec::Vec;
 use serde::{Deserialize, Serialize};
 
 /// What the observer carries from one tick to the next.
@@ -39,11 +41,11 @@ crate::state!(ObserverState {
 #[derive(Clone, Debug)]
 pub struct ObservedMode {
     /// `A` (n x n)
-    pub a: DMatrix<f64>,
+    pub a: Matrix,
     /// `B` (n x m)
-    pub b: DMatrix<f64>,
+    pub b: Matrix,
     /// `C` (p x n)
-    pub c: DMatrix<f64>,
+    pub c: Matrix,
     /// `x0 - A x0 - B u0` (n)
     pub state_offset: Vec<f64>,
     /// `y0 - C x0` (p)
@@ -51,6 +53,27 @@ pub struct ObservedMode {
 }
 
 impl ObservedMode {
+    /// The mode with its affine terms, in sums of fixed order.
+    pub fn new(mode: &ModeModel) -> Self {
+        let product = |matrix: &Matrix, vector: &[f64]| {
+            let mut out = vec![0.0; matrix.nrows()];
+            kernel::add_product(&mut out, matrix, vector);
+            out
+        };
+        let ax = product(&mode.a, &mode.x0);
+        let bu = product(&mode.b, &mode.u0);
+        let cx = product(&mode.c, &mode.x0);
+        let states = mode.x0.iter().zip(ax).zip(bu);
+        let outputs = mode.y0.iter().zip(cx);
+        Self {
+            a: mode.a.clone(),
+            b: mode.b.clone(),
+            c: mode.c.clone(),
+            state_offset: states.map(|((x0, ax), bu)| x0 - ax - bu).collect(),
+            output_offset: outputs.map(|(y0, cx)| y0 - cx).collect(),
+        }
+    }
+
     /// The state one sample on (n), from `state` (n) under the acting input `u` (m), bounded.
     pub fn step(&self, next: &mut [f64], state: &[f64], u: &[f64]) {
         kernel::affine(next, &self.state_offset, &self.a, state);
@@ -94,7 +117,7 @@ impl ObserverState {
         kernel::copy(&mut self.estimate, &self.prior);
         kernel::add_scaled(&mut self.estimate, 1.0, &self.injection);
         if let Some(gain) = observer.decoupling.get(from).and_then(|row| row.get(to)) {
-            kernel::add_product(&mut self.estimate, &gain.0, &self.innovation);
+            kernel::add_product(&mut self.estimate, gain, &self.innovation);
         }
         kernel::bound(&mut self.estimate);
     }
@@ -104,7 +127,7 @@ impl ObserverState {
     pub fn differentiate(&mut self, observer: &Observer, from: usize, to: usize, dy: &[f64]) {
         self.injection.fill(0.0);
         if let Some(gain) = observer.decoupling.get(from).and_then(|row| row.get(to)) {
-            kernel::add_product(&mut self.injection, &gain.0, dy);
+            kernel::add_product(&mut self.injection, gain, dy);
         }
         for (estimate, &change) in self.estimate.iter_mut().zip(&self.injection) {
             *estimate = kernel::bounded_change(*estimate, change);
@@ -112,7 +135,7 @@ impl ObserverState {
     }
 
     /// Predicts the next state under the acting input `u`, and keeps the injection of measurement `y`.
-    pub fn predict(&mut self, gain: &DMatrix<f64>, mode: &ObservedMode, u: &[f64], y: &[f64]) {
+    pub fn predict(&mut self, gain: &Matrix, mode: &ObservedMode, u: &[f64], y: &[f64]) {
         mode.output(&mut self.innovation, &self.estimate);
         subtract_from(&mut self.innovation, y);
         self.injection.fill(0.0);

@@ -8,6 +8,8 @@
 
 use super::kernel;
 use super::observer::ObservedMode;
+use alloc::vec;
+use alloc::vec::Vec;
 use serde::{Deserialize, Serialize};
 
 /// How many thresholds reading and model may differ: the run knows neither the disturbance nor what

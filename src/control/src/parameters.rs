@@ -1,15 +1,17 @@
 //! Everything the controller needs to know before its first tick: plain, serialisable data.
 
-use ftc_plant::rows;
-use ftc_plant::{Dimensions, SwitchedPlant};
-use nalgebra::DMatrix;
+use crate::matrix::Matrix;
+use alloc::string::String;
+use alloc::vec::Vec;
 use serde::{Deserialize, Serialize};
 
 /// A complete controller: the model it observes, its gains, its predictor, its decisions.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct ControllerParameters {
-    /// The plant as designed for (physical units).
-    pub plant: SwitchedPlant,
+    /// Sample time `Te` in seconds.
+    pub sample_time: f64,
+    /// The plant's modes as designed for (physical units); mode number `i` of the user is `modes[i - 1]`.
+    pub modes: Vec<ModeModel>,
     /// State feedback with integral action.
     pub feedback: StateFeedback,
     /// State observer.
@@ -20,6 +22,24 @@ pub struct ControllerParameters {
     pub compensation: Compensation,
     /// Limits of each input (m); the command is clamped to them.
     pub input_limits: Vec<Limits>,
+}
+
+/// One mode of the plant, linear about its operating point:
+/// `x(k+1) = x0 + A (x - x0) + B (u - u0)`, `y = y0 + C (x - x0)`.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct ModeModel {
+    /// State matrix `A` (n x n).
+    pub a: Matrix,
+    /// Input matrix `B` (n x m).
+    pub b: Matrix,
+    /// Output matrix `C` (p x n).
+    pub c: Matrix,
+    /// State `x0` of the operating point (n).
+    pub x0: Vec<f64>,
+    /// Input `u0` of the operating point (m).
+    pub u0: Vec<f64>,
+    /// Output `y0` of the operating point (p).
+    pub y0: Vec<f64>,
 }
 
 /// A closed interval; an absent end is unbounded.
@@ -82,24 +102,18 @@ impl StateFeedback {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct FeedbackGains {
     /// `K_i` (m x n).
-    #[serde(with = "rows")]
-    pub state_feedback: DMatrix<f64>,
+    pub state_feedback: Matrix,
     /// `G_i` (m x q); `q = r` without resonators.
-    #[serde(with = "rows")]
-    pub integral: DMatrix<f64>,
+    pub integral: Matrix,
     /// `N_i` (m x r; zero columns without feedforward): what a new reference does to the command
     /// before the integrators have taken it in.
-    #[serde(with = "rows")]
-    pub feedforward: DMatrix<f64>,
+    pub feedforward: Matrix,
     /// Gain on the command still acting (m x m; zero columns when latency is 0).
-    #[serde(with = "rows")]
-    pub previous_input: DMatrix<f64>,
+    pub previous_input: Matrix,
     /// Back-calculation gain (q x m): how a saturated command unwinds the integrator.
-    #[serde(with = "rows")]
-    pub anti_windup: DMatrix<f64>,
+    pub anti_windup: Matrix,
     /// `K_i C_i^+` (m x p): what a fault does to the command at once, in the printed control (37).
-    #[serde(with = "rows")]
-    pub output_feedback: DMatrix<f64>,
+    pub output_feedback: Matrix,
 }
 
 /// Which observer was designed.
@@ -122,10 +136,10 @@ pub struct Observer {
     /// Why this kind, where the user left the choice open.
     pub note: Option<String>,
     /// Output-injection gain `K_i*` of (13) per mode (n x p each).
-    pub gains: Vec<Gain>,
+    pub gains: Vec<Matrix>,
     /// `H_ij` of (14): `decoupling[i][j]` corrects on entering mode `j` from mode `i` (n x p each).
-    pub decoupling: Vec<Vec<Gain>>,
-    /// Gains for each set of lost sensors from whose rest the state can be observed, the smallest
+    pub decoupling: Vec<Vec<Matrix>>,
+    /// Matrixs for each set of lost sensors from whose rest the state can be observed, the smallest
     /// sets first; a set that is not listed is not served. With none lost, the gains above are used.
     #[serde(default)]
     pub lost: Vec<LostSet>,
@@ -141,13 +155,8 @@ pub struct LostSet {
     /// Which sensors (rows of `C`, from 0) are lost, in ascending order; never empty.
     pub sensors: Vec<usize>,
     /// `H` of each mode (n x p each); the columns of the lost sensors are zero.
-    pub correction: Vec<Gain>,
+    pub correction: Vec<Matrix>,
 }
-
-/// A matrix on its own, written as its rows.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(transparent)]
-pub struct Gain(#[serde(with = "rows")] pub DMatrix<f64>);
 
 /// How faults are estimated.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -208,9 +217,20 @@ pub enum Ambiguous {
     TrustModel,
 }
 
+/// How the periodic disturbance enters in one mode.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Channels {
+    /// Into the state: `E` (n x s).
+    pub e: Matrix,
+    /// Into the outputs: `F` (p x s).
+    pub f: Matrix,
+}
+
 /// Sizes and rates of what may happen to sensors and plant, for [`EstimatorMethod::Observer`].
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Hypotheses {
+    /// How the disturbance enters, per mode.
+    pub channels: Vec<Channels>,
     /// Faults per sample and sensor.
     pub fault_rate: f64,
     /// Freezes per sample and sensor.
@@ -265,87 +285,7 @@ pub struct Hypotheses {
     pub ambiguous: Ambiguous,
 }
 
-impl Estimator {
-    /// Whether what the method needs is there and fits a plant of size `dims`.
-    ///
-    /// # Errors
-    /// One sentence that names what does not.
-    pub fn check(&self, dims: Dimensions) -> Result<(), String> {
-        match (self.method, &self.hypotheses) {
-            (EstimatorMethod::Observer, Some(settings)) => settings.check(dims),
-            (EstimatorMethod::Observer, None) => Err(
-                "the design's estimator is state-based, but its sizes and rates are missing".into(),
-            ),
-            _ => Ok(()),
-        }
-    }
-}
-
 impl Hypotheses {
-    /// Whether sizes and rates fit a plant of size `dims`.
-    ///
-    /// # Errors
-    /// One sentence that names the first that does not.
-    pub fn check(&self, dims: Dimensions) -> Result<(), String> {
-        let waves = 2 * self.angles.len() * dims.disturbances;
-        for (what, values, needed) in [
-            ("fault_size", &self.fault_size, dims.outputs),
-            ("authority", &self.authority, dims.outputs),
-            ("input_load", &self.input_load, dims.inputs),
-            (
-                "disturbance_load",
-                &self.disturbance_load,
-                dims.disturbances,
-            ),
-            ("disturbance_size", &self.disturbance_size, waves),
-            ("state_load", &self.state_load, dims.states),
-            ("state_size", &self.state_size, dims.states),
-            ("start", &self.start, dims.states),
-            ("start_elsewhere", &self.start_elsewhere, dims.states),
-        ] {
-            let sensible = values.iter().all(|value| (0.0..=1e50).contains(value));
-            if values.len() != needed || !sensible {
-                return Err(format!(
-                    "the estimator's {what} must be {needed} numbers from 0 to 1e50"
-                ));
-            }
-        }
-        for (what, rate) in [
-            ("fault_rate", self.fault_rate),
-            ("stuck_rate", self.stuck_rate),
-            ("release_rate", self.release_rate),
-            ("change_rate", self.change_rate),
-            ("load_rate", self.load_rate),
-            ("load_moving", self.load_moving),
-        ] {
-            if !(1e-100..=0.999).contains(&rate) {
-                return Err(format!(
-                    "the estimator's {what} must lie between 1e-100 and 0.999"
-                ));
-            }
-        }
-        let others = [
-            self.surprise,
-            self.odds,
-            self.fault_walk,
-            self.drift_walk,
-            self.load_walk,
-            self.model_error,
-            self.gain_error,
-            self.gain_walk,
-            self.period_error,
-        ];
-        let sensible = others
-            .iter()
-            .chain(&self.angles)
-            .all(|value| (0.0..=1e6).contains(value));
-        if sensible {
-            Ok(())
-        } else {
-            Err("the estimator's sizes must lie between 0 and 1e6".into())
-        }
-    }
-
     /// Whether a slow divergence is taken for a sensor's fault.
     pub fn trusts_model(&self) -> bool {
         self.ambiguous == Ambiguous::TrustModel
@@ -356,11 +296,9 @@ impl Hypotheses {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Predictor {
     /// `Y1 U1^+` (p x m j).
-    #[serde(with = "rows")]
-    pub response: DMatrix<f64>,
+    pub response: Matrix,
     /// `R` of the QR factorisation of `U1'` (m j x m j, upper triangular): gives the leverage.
-    #[serde(with = "rows")]
-    pub factor: DMatrix<f64>,
+    pub factor: Matrix,
     /// Standard deviation of the residual on the database, per sensor (p).
     pub deviation: Vec<f64>,
     /// Samples in the database.
@@ -384,11 +322,9 @@ pub struct Harmonics {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct PhasorMap {
     /// Real part.
-    #[serde(with = "rows")]
-    pub real: DMatrix<f64>,
+    pub real: Matrix,
     /// Imaginary part.
-    #[serde(with = "rows")]
-    pub imaginary: DMatrix<f64>,
+    pub imaginary: Matrix,
 }
 
 /// How the estimated fault is compensated.

@@ -4,6 +4,8 @@
 //! residual alone tells this late, and not at all while the true output happens to pass by.
 
 use super::compensation::is_measurement;
+use alloc::vec;
+use alloc::vec::Vec;
 use serde::{Deserialize, Serialize};
 
 /// What a silent sensor says: no measurement, yet equal to itself.
@@ -42,7 +44,7 @@ impl Repetition {
     /// Takes a sample's readings (p); one repeated `limit` times in a row is none. A `limit` of zero
     /// lets everything through.
     pub fn screen(&mut self, readings: &[f64], limit: u32) -> &[f64] {
-        let held = std::mem::take(&mut self.held);
+        let held = core::mem::take(&mut self.held);
         let seen = self.last.iter_mut().zip(&mut self.repeats);
         for (((last, repeats), out), &given) in seen.zip(&mut self.screened).zip(readings) {
             let reading = if is_measurement(given) {

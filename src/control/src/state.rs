@@ -3,6 +3,8 @@
 //! A copy in place allocates nothing, so a tick can be tried on a copy between two ticks. Shapes
 //! are compared where a state comes from outside: on line, nothing else meets a wrong size.
 
+use alloc::vec::Vec;
+
 /// A value that changes at run time.
 pub trait State: Clone {
     /// Whether every vector has the length, and every constant the value, that `other` has.

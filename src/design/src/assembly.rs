@@ -3,18 +3,18 @@
 use super::commissioning::{self, Database, LONGEST_RESPONSE, RecordedDisturbance};
 use super::harmonics;
 use super::hypotheses::HypothesesSpec;
+use super::matrices::{dense, plain};
 use super::{
-    ControlSpec, Design, DesignError, FORMAT, ObserverSpec, Signal, Signals, check_controllable,
-    synthesise,
+    ControlSpec, ControllerDesign, Design, DesignError, FORMAT, ObserverSpec, Signal, Signals,
+    check_controllable, synthesise,
 };
 use crate::running_loop::{TRANSFER_DECAY, TransferCertificate};
-use ftc_control::ControllerParameters;
 use ftc_control::parameters::{
     Compensation, Estimator, EstimatorMethod, Harmonics, Limits, Predictor, StateFeedback, Transfer,
 };
 use ftc_plant::scaling::Scaling;
 use ftc_plant::{Dimensions, Mode, SwitchedPlant};
-use ftc_plant::{Scenario, Truth};
+use ftc_plant::{Scenario, TruePlant};
 
 /// A design that is asked for.
 #[derive(Clone, Debug)]
@@ -26,7 +26,7 @@ pub struct Request {
     /// The plant as it is designed for.
     pub plant: SwitchedPlant,
     /// What the simulated plant really is.
-    pub truth: Truth,
+    pub true_plant: TruePlant,
     /// The state feedback that is asked for.
     pub control: ControlSpec,
     /// Whether a mode switch leaves the command where it was.
@@ -181,15 +181,15 @@ pub fn assemble(request: Request) -> Result<Design, DesignError> {
         format: FORMAT,
         name: request.name,
         signals: request.signals,
-        controller: ControllerParameters {
-            plant: request.plant,
+        plant: request.plant,
+        controller: ControllerDesign {
             feedback,
             observer: synthesis.observer.observer.clone(),
             estimator,
             compensation: request.compensation,
             input_limits,
         },
-        truth: request.truth,
+        true_plant: request.true_plant,
         scenario: request.scenario,
         synthesis: Some(synthesis),
     })
@@ -243,14 +243,16 @@ pub fn feedback(
     if feedforward {
         let found = super::feedforward::feedforward(plant, control);
         for (gains, gain) in feedback.modes.iter_mut().zip(found) {
-            gains.feedforward = gain;
+            gains.feedforward = plain(&gain);
         }
     }
     for gains in &mut feedback.modes {
-        for (mut column, limit) in gains.anti_windup.column_iter_mut().zip(limits) {
+        let mut unwinding = dense(&gains.anti_windup);
+        for (mut column, limit) in unwinding.column_iter_mut().zip(limits) {
             let limited = limit.min.is_some() || limit.max.is_some();
             column *= if limited { UNWINDING } else { 0.0 };
         }
+        gains.anti_windup = plain(&unwinding);
     }
     feedback
 }

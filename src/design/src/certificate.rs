@@ -18,12 +18,14 @@ pub use enclosure::Enclosure;
 
 use super::augmented::{AugmentedMode, augment, scaled};
 use super::lyapunov::all_pairs;
+use super::matrices::dense;
 use super::observer::{self, ObserverDesign, corrected_error};
 use super::state_feedback::{ModeGains, StateFeedback};
 use super::units::is_unit;
 use super::verdict::{BlockKind, BlockName};
 use super::{ControlSpec, DwellTime, Lyapunov, Units};
-use ftc_control::parameters::{Gain, ObserverKind};
+use ftc_control::Matrix;
+use ftc_control::parameters::ObserverKind;
 use ftc_plant::rows;
 use ftc_plant::{Dimensions, SwitchedPlant};
 use nalgebra::DMatrix;
@@ -328,8 +330,8 @@ pub(crate) fn error_dynamics(
     let matrix = scaled_plant;
     let (own, next) = (&plant.modes[i], &plant.modes[j]);
     let a = matrix(&own.a, states, states);
-    let gain = matrix(&design.observer.gains[i].0, states, outputs);
-    let decoupling = matrix(&design.observer.decoupling[i][j].0, states, outputs);
+    let gain = matrix(&dense(&design.observer.gains[i]), states, outputs);
+    let decoupling = matrix(&dense(&design.observer.decoupling[i][j]), states, outputs);
     let seen = &matrix(&next.c, outputs, states) * &a;
     let injected = &gain * &matrix(&own.c, outputs, states);
     &(&a - &(&decoupling * &seen)) - &injected
@@ -451,15 +453,16 @@ fn check_observer_sizes(
     design.spec.check().map_err(malformed)?;
     let (n, p, modes) = (dims.states, dims.outputs, plant.modes.len());
     let (observer, certificate) = (&design.observer, &design.certificate);
-    let fits = |gain: &Gain| gain.0.shape() == (n, p);
+    let fits = |gain: &Matrix| gain.shape() == (n, p);
     let gains_fit = observer.gains.len() == modes
         && observer.decoupling.len() == modes
         && observer.decoupling.iter().all(|row| row.len() == modes)
         && observer.gains.iter().all(fits)
         && observer.decoupling.iter().flatten().all(fits);
-    let one_index = |(i, gain): (usize, &Gain)| {
+    let one_index = |(i, gain): (usize, &Matrix)| {
         let mut entered = observer.decoupling.iter().map(|row| &row[i]);
-        gain.0.iter().all(|&k| k == 0.0) && entered.all(|h| *h == observer.decoupling[i][i])
+        gain.as_slice().iter().all(|&k| k == 0.0)
+            && entered.all(|h| *h == observer.decoupling[i][i])
     };
     let form_fits = !gains_fit
         || observer.kind != ObserverKind::Kalman

@@ -5,6 +5,7 @@
 //! obtained by QR factorisation; `R` is kept, since it tells how far any later input lies from
 //! what the database has seen.
 
+use super::matrices::{dense, plain};
 use ftc_control::parameters::Predictor;
 use ftc_plant::noise;
 use ftc_plant::{Mode, spectral_radius};
@@ -202,8 +203,8 @@ pub fn predictor_of_stretches(
         .map(|column| (column.norm_squared() / freedom).sqrt())
         .collect();
     Ok(Predictor {
-        response: solution.rows(waves, inputs).transpose(),
-        factor: factor.view((waves, waves), (inputs, inputs)).into_owned(),
+        response: plain(&solution.rows(waves, inputs).transpose()),
+        factor: plain(&factor.view((waves, waves), (inputs, inputs)).into_owned()),
         deviation,
         samples,
     })
@@ -237,7 +238,7 @@ fn too_few(stretches: &[Database], unknowns: usize, response_length: usize) -> S
 /// Inputs are measured in `units` (m), so that a kilovolt and an ampere can be compared.
 pub fn weakest_direction(predictor: &Predictor, units: &[f64]) -> (f64, usize, usize) {
     let inputs = units.len();
-    let mut factor = predictor.factor.clone();
+    let mut factor = dense(&predictor.factor);
     for (column, mut entries) in factor.column_iter_mut().enumerate() {
         entries /= units[column % inputs];
     }
@@ -276,8 +277,8 @@ pub fn model_predictor(
         spread * amplitudes[i % m]
     }));
     Predictor {
-        response,
-        factor,
+        response: plain(&response),
+        factor: plain(&factor),
         deviation: deviation.to_vec(),
         samples,
     }
@@ -315,8 +316,8 @@ mod tests {
             let samples = length + commissioning_samples(2, length);
             let found = predictor(&commission(&mode, &[1.0, 2.0], &[0.0, 0.0], samples, 3), length, None).unwrap();
             let exact = model_predictor(&mode, length, &[1.0, 2.0], &[0.0, 0.0]);
-            let scale = exact.response.norm().max(1e-3);
-            prop_assert!((found.response - exact.response).norm() <= 1e-5 * scale);
+            let scale = dense(&exact.response).norm().max(1e-3);
+            prop_assert!((dense(&found.response) - dense(&exact.response)).norm() <= 1e-5 * scale);
         }
     }
 
@@ -362,10 +363,10 @@ mod tests {
             row[0] += 0.7 * (core::f64::consts::TAU * k as f64 / period + 0.4).sin();
         }
         let length = response_length(std::slice::from_ref(&mode)).unwrap();
-        let exact = model_predictor(&mode, length, &[1.0, 2.0], &[0.0, 0.0]).response;
+        let exact = dense(&model_predictor(&mode, length, &[1.0, 2.0], &[0.0, 0.0]).response);
         let known = RecordedDisturbance { period, count: 1 };
         let error = |disturbance| {
-            (predictor(&database, length, disturbance).unwrap().response - &exact).norm()
+            (dense(&predictor(&database, length, disturbance).unwrap().response) - &exact).norm()
                 / exact.norm()
         };
         assert!(error(Some(known)) < 1e-5, "{}", error(Some(known)));
@@ -377,7 +378,7 @@ mod tests {
     fn stretches_are_joined_without_mixing_their_pasts() {
         let mode = stable_mode(&[0.3; 21]);
         let length = response_length(std::slice::from_ref(&mode)).unwrap();
-        let exact = model_predictor(&mode, length, &[1.0, 2.0], &[0.0, 0.0]).response;
+        let exact = dense(&model_predictor(&mode, length, &[1.0, 2.0], &[0.0, 0.0]).response);
         let period = 37.0;
         let stretches = [(0, 1), (777, 2)].map(|(first, seed)| {
             let mut stretch = commission(&mode, &[1.0, 2.0], &[0.0, 0.0], 3 * length, seed);
@@ -390,12 +391,12 @@ mod tests {
         assert!(predictor(&stretches[0], length, Some(known)).is_err());
         let found = predictor_of_stretches(&stretches, length, Some(known)).unwrap();
         assert_eq!(found.samples, 4 * length);
-        let error = (&found.response - &exact).norm() / exact.norm();
+        let error = (dense(&found.response) - &exact).norm() / exact.norm();
         assert!(error < 1e-5, "{error}");
         let mut shifted = stretches;
         shifted[1].first += 10;
         let mixed = predictor_of_stretches(&shifted, length, Some(known)).unwrap();
-        assert!((mixed.response - &exact).norm() / exact.norm() > 1e-3);
+        assert!((dense(&mixed.response) - &exact).norm() / exact.norm() > 1e-3);
     }
 
     #[test]

@@ -5,8 +5,10 @@
 
 use crate::assembly::{self, KnownDisturbance};
 use crate::harmonics;
+use crate::matrices::dense;
 use crate::observer::{check_decoupling, lost_gains_fit};
 use crate::{Design, HypothesesSpec, Synthesis};
+use ftc_control::Matrix;
 use ftc_control::parameters::{Estimator, EstimatorMethod, FeedbackGains, ObserverKind};
 use nalgebra::DMatrix;
 
@@ -60,7 +62,8 @@ fn all(conditions: &[(bool, &str)]) -> Result<(), String> {
 }
 
 /// Whether two matrices agree up to rounding.
-fn close(found: &DMatrix<f64>, derived: &DMatrix<f64>) -> bool {
+fn close(found: &Matrix, derived: &Matrix) -> bool {
+    let (found, derived) = (dense(found), dense(derived));
     found.shape() == derived.shape()
         && found
             .iter()
@@ -70,7 +73,7 @@ fn close(found: &DMatrix<f64>, derived: &DMatrix<f64>) -> bool {
 
 fn check_feedback(design: &Design, synthesis: &Synthesis) -> Result<(), String> {
     let (running, proved) = (&design.controller.feedback, &synthesis.state_feedback);
-    let plant = &design.controller.plant;
+    let plant = &design.plant;
     all(&[
         (
             running.tracked == proved.spec.tracked,
@@ -145,14 +148,14 @@ fn check_observer(design: &Design, synthesis: &Synthesis) -> Result<(), String> 
         (lost_gains_fit(observer), "the gains for lost sensors"),
     ])?;
     match observer.kind {
-        ObserverKind::Uio => check_decoupling(&design.controller.plant, &synthesis.observer),
+        ObserverKind::Uio => check_decoupling(&design.plant, &synthesis.observer),
         ObserverKind::Luenberger | ObserverKind::Kalman => Ok(()),
     }
 }
 
 fn check_operating_points(design: &Design) -> Result<(), String> {
     let signals = &design.signals;
-    for (mode, described) in design.controller.plant.modes.iter().enumerate() {
+    for (mode, described) in design.plant.modes.iter().enumerate() {
         let point = &described.operating_point;
         let parts = [
             (&point.x, &signals.states, "state"),
@@ -230,7 +233,7 @@ fn hypotheses_fit(design: &Design) -> bool {
     let Some(found) = &estimator.hypotheses else {
         return estimator.method != EstimatorMethod::Observer;
     };
-    let plant = &design.controller.plant;
+    let plant = &design.plant;
     let spec = HypothesesSpec {
         model_error: found.model_error,
         fault_rate: found.fault_rate,
@@ -257,14 +260,19 @@ fn hypotheses_fit(design: &Design) -> bool {
 
 /// Finite, a regular triangular factor, deviations that are none or positive.
 fn plausible(predictor: &ftc_control::parameters::Predictor) -> bool {
-    let factor = &predictor.factor;
+    let factor = dense(&predictor.factor);
     let regular = (0..factor.nrows()).all(|k| factor[(k, k)] != 0.0);
     let triangular =
         (0..factor.ncols()).all(|c| (c + 1..factor.nrows()).all(|r| factor[(r, c)] == 0.0));
     let finite = |value: &f64| value.is_finite() && value.abs() < 1e12;
     regular
         && triangular
-        && predictor.response.iter().chain(factor.iter()).all(finite)
+        && predictor
+            .response
+            .as_slice()
+            .iter()
+            .chain(factor.iter())
+            .all(finite)
         && predictor.deviation.iter().all(|d| (0.0..1e12).contains(d))
 }
 
@@ -272,7 +280,7 @@ fn plausible(predictor: &ftc_control::parameters::Predictor) -> bool {
 fn transfers_fit(design: &Design, estimator: &Estimator) -> bool {
     let derived = match &estimator.harmonics {
         Some(known) if known.period > 0.0 && known.count > 0 && known.count < 100 => {
-            let plant = &design.controller.plant;
+            let plant = &design.plant;
             harmonics::transfers(plant, known.period * plant.sample_time, known.count)
         }
         Some(_) => return false,
@@ -289,11 +297,12 @@ fn transfers_fit(design: &Design, estimator: &Estimator) -> bool {
     let (found, derived) = (maps(&estimator.harmonic_transfers), maps(&derived));
     found.len() == derived.len()
         && found.iter().zip(&derived).all(|(f, d)| {
-            let largest = d.real.amax().max(d.imaginary.amax());
+            let [found, derived] = [f, d].map(|map| [dense(&map.real), dense(&map.imaginary)]);
+            let largest = derived[0].amax().max(derived[1].amax());
             let near = |a: &DMatrix<f64>, b: &DMatrix<f64>| {
                 a.shape() == b.shape() && (a - b).amax() <= 1e-7 * largest
             };
-            near(&f.real, &d.real) && near(&f.imaginary, &d.imaginary)
+            near(&found[0], &derived[0]) && near(&found[1], &derived[1])
         })
 }
 

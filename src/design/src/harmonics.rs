@@ -5,6 +5,7 @@
 //! `G_j G_i^+` times themselves in mode `j`. That is exact where the model is, and a far better
 //! start than silence where it nearly is.
 
+use super::matrices::plain;
 use core::f64::consts::TAU;
 use ftc_control::parameters::PhasorMap;
 use ftc_plant::{Mode, SwitchedPlant};
@@ -39,8 +40,8 @@ pub fn transfers(plant: &SwitchedPlant, period: f64, count: usize) -> Vec<Vec<Ve
             .unwrap_or_else(|_| from.adjoint());
         let product = to * inverse;
         PhasorMap {
-            real: product.map(|z| z.re),
-            imaginary: product.map(|z| z.im),
+            real: plain(&product.map(|z| z.re)),
+            imaginary: plain(&product.map(|z| z.im)),
         }
     };
     responses
@@ -128,7 +129,7 @@ mod tests {
         };
         let (a, b) = phasor(&plant.modes[0]);
         let map = &transfers(&plant, period, 1)[0][1][0];
-        let (re, im) = (map.real[0], map.imaginary[0]);
+        let (re, im) = (map.real.as_slice()[0], map.imaginary.as_slice()[0]);
         let expected = phasor(&plant.modes[1]);
         assert!(
             (re * a - im * b - expected.0).abs() < 1e-9

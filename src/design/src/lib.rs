@@ -20,6 +20,7 @@ mod hypotheses;
 #[cfg(feature = "solver")]
 pub mod lmi;
 mod lyapunov;
+mod matrices;
 pub mod observer;
 mod record;
 pub(crate) mod riccati;
@@ -42,8 +43,9 @@ pub use controllability::check_controllable;
 #[cfg(feature = "solver")]
 pub use hypotheses::HypothesesSpec;
 pub use lyapunov::{DwellTime, Lyapunov};
+pub use matrices::{dense, mode_models, plain};
 pub use observer::{LostCertificate, ObserverCertificate, ObserverDesign};
-pub use record::{Design, FORMAT, Signal, Signals};
+pub use record::{ControllerDesign, Design, FORMAT, Signal, Signals};
 pub use running_loop::{LostSensors, RunningLoop, SwitchingGain};
 pub use spec::{ControlSpec, Objective, ObserverChoice, ObserverSpec};
 pub use state_feedback::{ModeGains, StateFeedback};

@@ -1,14 +1,18 @@
 //! The design as a record: plain data, everything the exporter ships and the FMUs read.
 
 use super::Synthesis;
+use super::matrices::mode_models;
 use ftc_control::ControllerParameters;
-use ftc_control::parameters::EstimatorMethod;
+use ftc_control::parameters::{
+    Compensation, Estimator, EstimatorMethod, Limits, Observer, StateFeedback,
+};
 use ftc_plant::Dimensions;
-use ftc_plant::{Scenario, Truth};
+use ftc_plant::SwitchedPlant;
+use ftc_plant::{Scenario, TruePlant};
 use serde::{Deserialize, Serialize};
 
 /// Version of the record's layout; an FMU refuses a record of another.
-pub const FORMAT: u32 = 2;
+pub const FORMAT: u32 = 3;
 
 /// A finished design.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -19,16 +23,33 @@ pub struct Design {
     pub name: String,
     /// What the signals are called and measured in.
     pub signals: Signals,
-    /// The controller, with the plant it was designed for.
-    pub controller: ControllerParameters,
+    /// The plant as it was designed for (physical units).
+    pub plant: SwitchedPlant,
+    /// The controller.
+    pub controller: ControllerDesign,
     /// What the simulated plant really is.
     #[serde(default)]
-    pub truth: Truth,
+    pub true_plant: TruePlant,
     /// The experiment the plant FMU plays.
     pub scenario: Scenario,
     /// What proves the gains; none where they were not made by synthesis.
     #[serde(default)]
     pub synthesis: Option<Synthesis>,
+}
+
+/// What of a controller is not the plant's.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct ControllerDesign {
+    /// State feedback with integral action.
+    pub feedback: StateFeedback,
+    /// State observer.
+    pub observer: Observer,
+    /// Fault estimator.
+    pub estimator: Estimator,
+    /// How an estimated fault is taken out of the loop.
+    pub compensation: Compensation,
+    /// Limits of each input (m); the command is clamped to them.
+    pub input_limits: Vec<Limits>,
 }
 
 /// Descriptions of the plant's signals.
@@ -61,6 +82,20 @@ pub struct Signal {
 }
 
 impl Design {
+    /// The data of the on-line controller.
+    pub fn parameters(&self) -> ControllerParameters {
+        let controller = self.controller.clone();
+        ControllerParameters {
+            sample_time: self.plant.sample_time,
+            modes: mode_models(&self.plant),
+            feedback: controller.feedback,
+            observer: controller.observer,
+            estimator: controller.estimator,
+            compensation: controller.compensation,
+            input_limits: controller.input_limits,
+        }
+    }
+
     /// Whether every part fits the plant, so that nothing on line meets a wrong size.
     ///
     /// # Errors
@@ -72,7 +107,7 @@ impl Design {
                 self.format
             ));
         }
-        let plant = &self.controller.plant;
+        let plant = &self.plant;
         let dims = Dimensions::check(plant)?;
         let modes = plant.modes.len();
         let scenario = &self.scenario;
@@ -131,7 +166,6 @@ impl Design {
                 ));
             }
         }
-        self.controller.estimator.check(dims)?;
         if tracked.iter().any(|&row| row >= dims.outputs) {
             return Err(format!(
                 "the design tracks an output beyond its {}",
@@ -147,7 +181,7 @@ impl Design {
                 "the schedule names a mode beyond the plant's {modes}"
             ));
         }
-        if let Truth::Linear { plant: truth } = &self.truth
+        if let TruePlant::Linear { plant: truth } = &self.true_plant
             && (Dimensions::check(truth)? != dims || truth.modes.len() != modes)
         {
             return Err("the true plant has other sizes than the designed one".into());

@@ -24,7 +24,7 @@ use crate::observer::{check_detectable, sets};
 use crate::riccati;
 use crate::verdict::{BlockKind, BlockName};
 use crate::{ObserverDesign, StateFeedback, Units};
-use ftc_control::parameters::Gain;
+use ftc_control::Matrix;
 use ftc_plant::SwitchedPlant;
 use gain::Channel;
 use model::{Loop, Models};
@@ -195,7 +195,7 @@ impl<'a> Subject<'a> {
     fn without(&self, sensors: &[usize]) -> Option<Vec<Loop>> {
         let lost = &self.observer.observer.lost;
         let set = lost.iter().find(|set| set.sensors == sensors)?;
-        let of = |(mode, gain): (usize, &Gain)| self.models.corrected(mode, gain, sensors);
+        let of = |(mode, gain): (usize, &Matrix)| self.models.corrected(mode, gain, sensors);
         Some(set.correction.iter().enumerate().map(of).collect())
     }
 

@@ -15,7 +15,9 @@ mod theorem;
 pub use synthesis::synthesise;
 
 use super::certificate::{self, CertificateError, ControlCertificate};
+use super::matrices::plain;
 use super::{ControlSpec, DwellTime, pseudo_inverse};
+use ftc_control::Matrix;
 use ftc_control::parameters::{self, FeedbackGains};
 use ftc_plant::SwitchedPlant;
 use ftc_plant::rows;
@@ -89,18 +91,15 @@ impl StateFeedback {
     /// an FMU only multiplies and adds and gives the same bits on every machine. The anti-windup
     /// gain is `G^+`: the integral is pulled back to where the clamped command would have come from.
     pub fn for_controller(&self, plant: &SwitchedPlant) -> parameters::StateFeedback {
-        let modes = self
-            .modes
-            .iter()
-            .zip(&plant.modes)
-            .map(|(gains, mode)| FeedbackGains {
-                state_feedback: gains.state_feedback.clone(),
-                integral: gains.integral.clone(),
-                feedforward: DMatrix::zeros(gains.integral.nrows(), 0),
-                previous_input: gains.previous_input.clone(),
-                anti_windup: pseudo_inverse(&gains.integral, 1e-12),
-                output_feedback: &gains.state_feedback * pseudo_inverse(&mode.c, 1e-12),
-            });
+        let modes = self.modes.iter().zip(&plant.modes);
+        let modes = modes.map(|(gains, mode)| FeedbackGains {
+            state_feedback: plain(&gains.state_feedback),
+            integral: plain(&gains.integral),
+            feedforward: Matrix::zeros(gains.integral.nrows(), 0),
+            previous_input: plain(&gains.previous_input),
+            anti_windup: plain(&pseudo_inverse(&gains.integral, 1e-12)),
+            output_feedback: plain(&(&gains.state_feedback * pseudo_inverse(&mode.c, 1e-12))),
+        });
         parameters::StateFeedback {
             tracked: self.spec.tracked.clone(),
             latency: self.spec.latency,

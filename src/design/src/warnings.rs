@@ -5,6 +5,7 @@
 use crate::assembly::DatabaseSource;
 use crate::commissioning::{Database, model_predictor};
 use crate::record::Design;
+use ftc_control::Matrix;
 use ftc_control::estimator::leverage;
 use ftc_control::parameters::{Estimator, EstimatorMethod, Predictor};
 use ftc_plant::Mode;
@@ -141,7 +142,7 @@ struct ModeDurations(Vec<u64>);
 
 impl ModeDurations {
     fn of(design: &Design) -> Self {
-        let te = design.controller.plant.sample_time;
+        let te = design.plant.sample_time;
         let scenario = &design.scenario;
         let mut switches = vec![0];
         for pair in scenario.schedule.windows(2) {
@@ -242,8 +243,8 @@ impl<'a> Steady<'a> {
 /// Modes in which the references need inputs that the database does not span.
 fn outside_the_database(design: &Design) -> Vec<Warning> {
     let controller = &design.controller;
-    let (scenario, te) = (&design.scenario, controller.plant.sample_time);
-    let modes = controller.plant.modes.iter();
+    let (scenario, te) = (&design.scenario, design.plant.sample_time);
+    let modes = design.plant.modes.iter();
     let steady: Vec<Option<Steady>> = modes
         .zip(&controller.estimator.predictors)
         .map(|(mode, predictor)| Steady::new(mode, predictor, &controller.feedback.tracked))
@@ -271,7 +272,7 @@ fn outside_the_database(design: &Design) -> Vec<Warning> {
 /// Names the input that goes farthest.
 fn beyond(design: &Design, mode: usize, u: &DVector<f64>, widening: f64) -> Warning {
     let inputs = &design.signals.inputs;
-    let point = &design.controller.plant.modes[mode].operating_point.u;
+    let point = &design.plant.modes[mode].operating_point.u;
     let farthest = |&input: &usize| ((u[input] - point[input]) / inputs[input].nominal).abs();
     let input = (0..u.len())
         .max_by(|a, b| farthest(a).total_cmp(&farthest(b)))
@@ -288,7 +289,7 @@ fn beyond(design: &Design, mode: usize, u: &DVector<f64>, widening: f64) -> Warn
 fn doubtful_logs(logged: &LoggedMovement, design: &Design) -> Vec<Warning> {
     let controller = &design.controller;
     let mut warnings = Vec::new();
-    for (index, (mode, predictor)) in controller
+    for (index, (mode, predictor)) in design
         .plant
         .modes
         .iter()
@@ -299,9 +300,9 @@ fn doubtful_logs(logged: &LoggedMovement, design: &Design) -> Vec<Warning> {
         let length = controller.estimator.response_length;
         let model = model_predictor(mode, length, &units, &predictor.deviation).response;
         for output in 0..design.signals.outputs.len() {
-            let row = |response: &DMatrix<f64>| -> Vec<f64> {
+            let row = |response: &Matrix| -> Vec<f64> {
                 let row = response.row(output);
-                let scaled = row.iter().zip(units.iter().cycle());
+                let scaled = row.zip(units.iter().cycle());
                 scaled.map(|(value, unit)| value * unit).collect()
             };
             let moved = logged.0[index][output];

@@ -16,11 +16,11 @@ pub mod rectifier;
 pub mod rows;
 pub mod scaling;
 pub mod scenario;
-mod truth;
+mod true_plant;
 
 pub use dimensions::Dimensions;
 pub use scenario::Scenario;
-pub use truth::Truth;
+pub use true_plant::TruePlant;
 
 use nalgebra::{DMatrix, DVector};
 use serde::{Deserialize, Serialize};

@@ -2,7 +2,7 @@
 
 use super::metrics::{self, Merit};
 use super::plant::{External, PlantSimulator, PlantState};
-use ftc_control::{Compensate, Controller, ControllerState, Sample};
+use ftc_control::{Compensate, Controller, ControllerState};
 use serde::Serialize;
 
 /// Who closes the loop.
@@ -131,14 +131,11 @@ impl Regulator for Tolerant<'_> {
             Variant::ToldTheFault => Compensate::Known(&seen.fault),
             _ => Compensate::Estimate,
         };
-        let sample = Sample {
-            tick: seen.tick,
-            mode: seen.mode,
-            measurement: &seen.y,
-            reference: &seen.reference,
-            thresholds: &self.controller.parameters().estimator.thresholds,
-            compensate,
-        };
+        let sample = self
+            .controller
+            .sample(seen.tick, seen.mode, &seen.y, &seen.reference)
+            .and_then(|sample| sample.compensating(compensate))
+            .expect("plant and controller have the same sizes");
         self.controller.tick(&mut self.state, &sample);
     }
 

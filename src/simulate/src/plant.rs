@@ -6,9 +6,10 @@ mod rectifier;
 pub use derivative::Change;
 
 use super::integrate::Stalled;
-use ftc_control::kernel;
 use ftc_control::state::State;
-use ftc_plant::Truth;
+use ftc_control::{Matrix, kernel};
+use ftc_design::plain;
+use ftc_plant::TruePlant;
 use ftc_plant::noise;
 use ftc_plant::scenario::{FaultEvent, Scenario};
 use ftc_plant::{Mode, SwitchedPlant};
@@ -18,18 +19,42 @@ use serde::{Deserialize, Serialize};
 #[derive(Clone, Debug)]
 pub struct PlantSimulator {
     plant: SwitchedPlant,
-    truth: Truth,
+    true_plant: TruePlant,
     scenario: Scenario,
-    offsets: Vec<Offsets>,
+    modes: Vec<Dynamics>,
 }
 
-/// The affine terms of one mode.
+/// One mode as it runs: affine in physical units.
 #[derive(Clone, Debug)]
-struct Offsets {
+struct Dynamics {
+    /// `A` (n x n).
+    a: Matrix,
+    /// `B` (n x m).
+    b: Matrix,
+    /// `C` (p x n).
+    c: Matrix,
+    /// `E` (n x s).
+    e: Matrix,
+    /// `F` (p x s).
+    f: Matrix,
     /// `x0 - A x0 - B u0` (n).
-    state: Vec<f64>,
+    state_offset: Vec<f64>,
     /// `y0 - C x0` (p).
-    output: Vec<f64>,
+    output_offset: Vec<f64>,
+}
+
+impl Dynamics {
+    fn new(mode: &Mode) -> Self {
+        Self {
+            a: plain(&mode.a),
+            b: plain(&mode.b),
+            c: plain(&mode.c),
+            e: plain(&mode.e),
+            f: plain(&mode.f),
+            state_offset: mode.state_offset().as_slice().to_vec(),
+            output_offset: mode.output_offset().as_slice().to_vec(),
+        }
+    }
 }
 
 /// Signals added from outside, or in place of the scenario.
@@ -89,23 +114,22 @@ ftc_control::state!(PlantState {
 });
 
 impl PlantSimulator {
-    /// Prepares a plant that is what it was designed for; see [`with_truth`](Self::with_truth).
+    /// Prepares a plant that is what it was designed for; see [`with_true_plant`](Self::with_true_plant).
     pub fn new(plant: SwitchedPlant, scenario: Scenario) -> Self {
-        Self::with_truth(plant, Truth::AsDesigned, scenario)
+        Self::with_true_plant(plant, TruePlant::AsDesigned, scenario)
     }
 
     /// Prepares a plant; the scenario's signals and the truth must have the design's sizes.
-    pub fn with_truth(designed: SwitchedPlant, truth: Truth, scenario: Scenario) -> Self {
-        let plant = truth.linear(&designed).clone();
-        let collect = |v: nalgebra::DVector<f64>| v.iter().copied().collect::<Vec<f64>>();
-        let offsets = plant.modes.iter().map(|mode| Offsets {
-            state: collect(mode.state_offset()),
-            output: collect(mode.output_offset()),
-        });
+    pub fn with_true_plant(
+        designed: SwitchedPlant,
+        true_plant: TruePlant,
+        scenario: Scenario,
+    ) -> Self {
+        let plant = true_plant.linear(&designed).clone();
         Self {
-            offsets: offsets.collect(),
+            modes: plant.modes.iter().map(Dynamics::new).collect(),
             plant,
-            truth,
+            true_plant,
             scenario,
         }
     }
@@ -164,7 +188,7 @@ impl PlantSimulator {
         let scenario = &self.scenario;
         let built_in = external.mode.is_none();
         state.mode = self.active_mode(external, tick);
-        let Some((mode, offsets)) = self.described(state.mode) else {
+        let Some(mode) = self.modes.get(state.mode) else {
             return;
         };
         let value = |signal: &ftc_plant::scenario::Waveform| {
@@ -190,7 +214,7 @@ impl PlantSimulator {
             *out = value(signal) + added;
         }
         self.draw_noise(state, external.noise);
-        kernel::affine(&mut state.y_true, &offsets.output, &mode.c, &state.x);
+        kernel::affine(&mut state.y_true, &mode.output_offset, &mode.c, &state.x);
         kernel::add_product(&mut state.y_true, &mode.f, &state.disturbance);
         kernel::bound(&mut state.y_true);
         self.read_sensors(state, built_in);
@@ -204,19 +228,14 @@ impl PlantSimulator {
             .min(self.plant.modes.len().saturating_sub(1))
     }
 
-    /// The matrices and offsets of a mode (0-based), if there is such a mode.
-    fn described(&self, mode: usize) -> Option<(&Mode, &Offsets)> {
-        self.plant.modes.get(mode).zip(self.offsets.get(mode))
-    }
-
     /// Moves to the next tick under input `u` (m), held over the sample.
     ///
     /// # Errors
     /// [`Stalled`] where the nonlinear plant cannot be integrated; the tick then ends where that
     /// became so, and later ticks go on from there.
     pub fn advance(&self, state: &mut PlantState, u: &[f64]) -> Result<(), Stalled> {
-        let result = match &self.truth {
-            Truth::Rectifier(rectifier) => rectifier::advance_rectifier(
+        let result = match &self.true_plant {
+            TruePlant::Rectifier(rectifier) => rectifier::advance_rectifier(
                 rectifier,
                 state.mode,
                 &mut state.x,
@@ -224,7 +243,7 @@ impl PlantSimulator {
                 &state.disturbance,
                 self.plant.sample_time,
             ),
-            Truth::AsDesigned | Truth::Linear { .. } => {
+            TruePlant::AsDesigned | TruePlant::Linear { .. } => {
                 self.advance_linear(state, u);
                 Ok(())
             }
@@ -235,10 +254,10 @@ impl PlantSimulator {
     }
 
     fn advance_linear(&self, state: &mut PlantState, u: &[f64]) {
-        let Some((mode, offsets)) = self.described(state.mode) else {
+        let Some(mode) = self.modes.get(state.mode) else {
             return;
         };
-        kernel::affine(&mut state.next, &offsets.state, &mode.a, &state.x);
+        kernel::affine(&mut state.next, &mode.state_offset, &mode.a, &state.x);
         kernel::add_product(&mut state.next, &mode.b, u);
         kernel::add_product(&mut state.next, &mode.e, &state.disturbance);
         kernel::copy(&mut state.x, &state.next);

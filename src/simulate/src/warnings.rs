@@ -5,7 +5,7 @@ use crate::{Trajectory, Variant};
 use ftc_control::estimator::InputHistory;
 use ftc_control::parameters::{Estimator, EstimatorMethod};
 use ftc_design::Design;
-use ftc_plant::Truth;
+use ftc_plant::TruePlant;
 
 /// Share of the samples of a run that may lie outside the database without a warning.
 const SHARE_OUTSIDE: f64 = 0.05;
@@ -166,7 +166,7 @@ impl OutsideDatabase {
     /// Plays the inputs of a run once more.
     fn of(design: &Design, run: &Trajectory) -> Self {
         let controller = &design.controller;
-        let (estimator, modes) = (&controller.estimator, &controller.plant.modes);
+        let (estimator, modes) = (&controller.estimator, &design.plant.modes);
         let mut outside = Self {
             samples: 0,
             widening: 1.0,
@@ -196,13 +196,13 @@ impl OutsideDatabase {
 fn stopped(design: &Design, run: &Trajectory) -> Option<RunWarning> {
     Some(RunWarning::Stopped {
         variant: run.variant,
-        time: run.stalled? as f64 * design.controller.plant.sample_time,
+        time: run.stalled? as f64 * design.plant.sample_time,
     })
 }
 
 /// A rectifier that left the region in which it is the plant of the design.
 fn diodes_conduct(design: &Design, run: &Trajectory) -> Option<RunWarning> {
-    let Truth::Rectifier(rectifier) = &design.truth else {
+    let TruePlant::Rectifier(rectifier) = &design.true_plant else {
         return None;
     };
     let voltage = rectifier.diode_voltage();
@@ -212,7 +212,7 @@ fn diodes_conduct(design: &Design, run: &Trajectory) -> Option<RunWarning> {
     Some(RunWarning::DiodesConduct {
         variant: run.variant,
         voltage,
-        time: first.tick as f64 * design.controller.plant.sample_time,
+        time: first.tick as f64 * design.plant.sample_time,
         share: count as f64 / run.records.len() as f64,
     })
 }

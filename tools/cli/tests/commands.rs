@@ -373,11 +373,7 @@ fn an_fmu_holds_every_platform_that_is_there_and_belongs_to_its_design() {
         assert!(xml.contains(&format!("modelIdentifier=\"sound_{kind}\"")));
         let record: ftc_design::Design = serde_json::from_slice(design).unwrap();
         assert_eq!(record.name, "sound");
-        record
-            .synthesis
-            .unwrap()
-            .verify(&record.controller.plant)
-            .unwrap();
+        record.synthesis.unwrap().verify(&record.plant).unwrap();
     }
 }
 

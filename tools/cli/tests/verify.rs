@@ -305,10 +305,7 @@ fn a_careful_forger_is_found_out() {
 
     let mut plant = Exported::new(SOUND);
     plant.change(DESIGN, |design| {
-        scaled(
-            &mut design["controller"]["plant"]["modes"][0]["a"][0][0],
-            1.3,
-        );
+        scaled(&mut design["plant"]["modes"][0]["a"][0][0], 1.3);
     });
     plant.seal();
     plant.refused("another plant", 1, &["could not be proved"]);

@@ -17,7 +17,7 @@ use ftc_design::{ControlSpec, HypothesesSpec, Lyapunov, Objective, ObserverSpec,
 use ftc_plant::rows;
 use ftc_plant::scenario::{ModeInterval, Waveform};
 use ftc_plant::{Dimensions, Mode, OperatingPoint, SwitchedPlant};
-use ftc_plant::{Scenario, Truth};
+use ftc_plant::{Scenario, TruePlant};
 use nalgebra::DMatrix;
 use std::path::Path;
 
@@ -66,7 +66,7 @@ pub fn request(file: &DesignFile, folder: &Path) -> Result<Request, String> {
         name: file.name.clone(),
         signals,
         plant,
-        truth: truth(file),
+        true_plant: true_plant(file),
         control,
         bumpless: file.controller.bumpless.unwrap_or(defaults::BUMPLESS),
         feedforward: file.controller.feedforward.unwrap_or(defaults::FEEDFORWARD),
@@ -83,10 +83,10 @@ fn at<T>(key: &str, result: Result<T, String>) -> Result<T, String> {
 }
 
 /// What is simulated: the modes themselves, or the named model they are linearised from.
-fn truth(file: &DesignFile) -> Truth {
+fn true_plant(file: &DesignFile) -> TruePlant {
     match &file.plant {
-        None => Truth::AsDesigned,
-        Some(PlantModel::Rectifier(rectifier)) => Truth::Rectifier(rectifier.clone()),
+        None => TruePlant::AsDesigned,
+        Some(PlantModel::Rectifier(rectifier)) => TruePlant::Rectifier(rectifier.clone()),
     }
 }
 

@@ -269,7 +269,7 @@ fn prove(design: &Design) -> Result<(), Error> {
         .as_ref()
         .ok_or_else(|| refused("the design carries no certificate and is not exported".into()))?;
     synthesis
-        .verify(&design.controller.plant)
+        .verify(&design.plant)
         .map_err(|error| refused(format!("the certificate does not check ({error})")))
 }
 

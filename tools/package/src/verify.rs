@@ -105,7 +105,7 @@ impl Fmu {
         shipped.agree(&expected).map_err(Unproved)?;
         if let Some(synthesis) = &design.synthesis {
             synthesis
-                .verify(&design.controller.plant)
+                .verify(&design.plant)
                 .map_err(|error| Unproved(format!("{error}: export the design again")))?;
         }
         self.check_description(kind, &design, bytes)?;
@@ -209,7 +209,7 @@ pub struct Verification {
 impl fmt::Display for Verification {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let claims = &self.certificate.claims;
-        let modes = &self.design.controller.plant.modes;
+        let modes = &self.design.plant.modes;
         writeln!(f, "{}: proved", self.design.name)?;
         let mut line = |name: &str, value: String| writeln!(f, "  {name:<21} {value}");
         line("state feedback", promise(&claims.state_feedback))?;

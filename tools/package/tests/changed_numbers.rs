@@ -26,7 +26,7 @@ fn proves(design: &Design) -> Result<(), String> {
     design.check()?;
     coverage::check(design)?;
     let synthesis = design.synthesis.as_ref().ok_or("no proof")?;
-    let proved = synthesis.verify(&design.controller.plant);
+    let proved = synthesis.verify(&design.plant);
     proved.map_err(|error| error.to_string())
 }
 
@@ -68,15 +68,15 @@ fn changes(number: &Number) -> Vec<Value> {
 fn harmless(path: &str, design: &Design, original: &Design) -> bool {
     let begins = |prefix: &str| path.starts_with(prefix);
     // The plant and what is proved of it: the proof went through for the changed numbers.
-    let proved_again = begins("/synthesis/") || begins("/controller/plant/modes/");
+    let proved_again = begins("/synthesis/") || begins("/plant/modes/");
     // Named as not proved by `verify`, and without a part in the linear loop.
     let named = begins("/controller/estimator/");
     // What the plant FMU plays, and what signals are called: no part of the controller.
-    let elsewhere = begins("/scenario/") || begins("/truth/") || begins("/signals/");
+    let elsewhere = begins("/scenario/") || begins("/true_plant/") || begins("/signals/");
     let same_loop = design.controller.feedback == original.controller.feedback
         && design.controller.observer == original.controller.observer
         && design.controller.input_limits == original.controller.input_limits;
-    (proved_again || named || elsewhere || begins("/controller/plant/sample_time")) && same_loop
+    (proved_again || named || elsewhere || begins("/plant/sample_time")) && same_loop
 }
 
 /// Whether everything the proofs and relations read is that of the original.
@@ -103,8 +103,7 @@ fn every_leaf_of(example: &str) {
                 continue;
             };
             // The proofs do not read the estimator, nor what is played: they hold as before.
-            let untouched = same_claims(&design, &original)
-                && design.controller.plant == original.controller.plant;
+            let untouched = same_claims(&design, &original) && design.plant == original.plant;
             let verdict = match untouched {
                 true => design.check().and_then(|()| coverage::check(&design)),
                 false => proves(&design),
@@ -163,17 +162,19 @@ fn what_decides_the_command_is_derived_again() {
         assert!(sentence.contains(what), "{what}: {sentence}");
     };
     refused("feedforward", &|d| {
-        d.controller.feedback.modes[0].feedforward[(0, 0)] *= 1.001;
+        d.controller.feedback.modes[0].feedforward.as_mut_slice()[0] *= 1.001;
     });
     refused("anti-windup", &|d| {
-        d.controller.feedback.modes[1].anti_windup[(0, 0)] += 1e-3;
+        d.controller.feedback.modes[1].anti_windup.as_mut_slice()[0] += 1e-3;
     });
     refused("operating state", &|d| {
-        d.controller.plant.modes[0].operating_point.x[0] = 1e18;
+        d.plant.modes[0].operating_point.x[0] = 1e18;
     });
     refused("limit", &|d| d.controller.input_limits[0].max = Some(1e9));
     refused("additive control", &|d| {
-        d.controller.feedback.modes[0].output_feedback[(0, 0)] += 1.0;
+        d.controller.feedback.modes[0]
+            .output_feedback
+            .as_mut_slice()[0] += 1.0;
     });
     refused("largest fault", &|d| {
         d.controller.estimator.largest_fault[0] = 0.0

@@ -1,6 +1,6 @@
 //! The on-line controller, one sample at a time.
 
-use ftc_control::{Compensate, ControllerState, Sample};
+use ftc_control::{Compensate, ControllerState};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use std::sync::Arc;
@@ -21,7 +21,8 @@ impl Controller {
     /// # Errors
     /// What the controller says of its parameters.
     pub fn of(design: &ftc_design::Design) -> PyResult<Self> {
-        let controller = ftc_control::Controller::new(design.controller.clone());
+        let controller = ftc_control::Controller::new(design.parameters())
+            .map_err(|error| PyValueError::new_err(error.to_string()))?;
         Ok(Self {
             state: controller.initial_state(0),
             controller: Arc::new(controller),
@@ -42,7 +43,7 @@ impl Controller {
 
     /// A mode counted from 0.
     fn mode(&self, number: i64) -> PyResult<usize> {
-        let modes = self.controller.parameters().plant.modes.len();
+        let modes = self.controller.parameters().modes.len();
         let index = usize::try_from(number)
             .ok()
             .and_then(|number| number.checked_sub(1));
@@ -58,7 +59,7 @@ impl Controller {
     fn step(&mut self, y: Vec<f64>, y_ref: Vec<f64>, mode: i64) -> PyResult<Vec<f64>> {
         let mode = self.mode(mode)?;
         let parameters = self.controller.parameters();
-        self.check("y", &y, parameters.plant.dimensions().outputs)?;
+        self.check("y", &y, parameters.estimator.thresholds.len())?;
         self.check("y_ref", &y_ref, parameters.feedback.tracked.len())?;
         if let Some(at) = y_ref.iter().position(|value| !value.is_finite()) {
             let what = format!("y_ref[{at}] is {}: give a finite number", y_ref[at]);
@@ -67,17 +68,15 @@ impl Controller {
         if self.tick == 0 {
             self.state = self.controller.initial_state(mode);
         }
-        let sample = Sample {
-            tick: self.tick,
-            mode,
-            measurement: &y,
-            reference: &y_ref,
-            thresholds: &parameters.estimator.thresholds,
-            compensate: match self.ftc_enabled {
-                true => Compensate::Estimate,
-                false => Compensate::Nothing,
-            },
+        let compensate = match self.ftc_enabled {
+            true => Compensate::Estimate,
+            false => Compensate::Nothing,
         };
+        let sample = self
+            .controller
+            .sample(self.tick, mode, &y, &y_ref)
+            .and_then(|sample| sample.compensating(compensate))
+            .map_err(|error| PyValueError::new_err(error.to_string()))?;
         self.controller.tick(&mut self.state, &sample);
         self.tick += 1;
         Ok(self.state.command.clone())

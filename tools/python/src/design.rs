@@ -114,7 +114,7 @@ impl Design {
         if let Some(text) = text {
             let request = requested(py, text, &folder)?;
             design.scenario = request.scenario;
-            design.truth = request.truth;
+            design.true_plant = request.true_plant;
         }
         let made = self.0.clone();
         let simulated = wait(py, "simulating", None, move || {

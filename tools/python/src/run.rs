@@ -49,7 +49,7 @@ impl Run {
     pub fn of(design: &Design, warnings: Vec<String>, baselines: bool) -> Result<Self, String> {
         Ok(Self {
             simulation: report::simulate::simulate(design, warnings, baselines)?,
-            sample_time: design.controller.plant.sample_time,
+            sample_time: design.plant.sample_time,
             tracked: design.controller.feedback.tracked.clone(),
             outputs: design
                 .signals

@@ -130,7 +130,7 @@ def test_our_nonlinear_rectifier_equals_its_analytic_linearisation(rectifier: tu
     """Sample by sample, to 1e-6 of each matrix's size."""
     design, fmu = rectifier
     record = design.record()
-    modes = record["controller"]["plant"]["modes"]
+    modes = record["plant"]["modes"]
     points = []
     for number, mode in enumerate(modes, 1):
         u = mode["operating_point"]["u"]

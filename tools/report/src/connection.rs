@@ -127,7 +127,7 @@ const PLANT: [Signal; 13] = [
 
 /// The section "How to connect" of an FMU's documentation.
 pub fn section(design: &Design, side: Side) -> Section {
-    let te = design.controller.plant.sample_time;
+    let te = design.plant.sample_time;
     let (signals, parameters): (&[Signal], &[(&str, &str)]) = match side {
         Side::Controller => (
             &CONTROLLER,

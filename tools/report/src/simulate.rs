@@ -61,9 +61,9 @@ pub fn simulate(
 }
 
 fn plant(design: &Design) -> PlantSimulator {
-    PlantSimulator::with_truth(
-        design.controller.plant.clone(),
-        design.truth.clone(),
+    PlantSimulator::with_true_plant(
+        design.plant.clone(),
+        design.true_plant.clone(),
         design.scenario.clone(),
     )
 }
@@ -78,7 +78,8 @@ pub fn trajectories(design: &Design) -> Vec<Trajectory> {
 
 /// One variant of the design's scenario.
 pub fn one(design: &Design, variant: Variant) -> Trajectory {
-    let controller = Controller::new(design.controller.clone());
+    let controller =
+        Controller::new(design.parameters()).expect("a finished design has matching sizes");
     run(&plant(design), &controller, variant)
 }
 
@@ -92,7 +93,7 @@ fn table(design: &Design, trajectories: &[Trajectory]) -> csv::Result<Vec<u8>> {
     let mut row = Vec::new();
     for (at, record) in records.iter().enumerate() {
         row.clear();
-        let time = record.tick as f64 * design.controller.plant.sample_time;
+        let time = record.tick as f64 * design.plant.sample_time;
         row.push(number(time));
         row.push((record.mode + 1).to_string());
         for (_, values) in shared(record) {
@@ -191,7 +192,7 @@ fn summary(design: &Design, trajectories: &[Trajectory], bound: Option<&[f64]>) 
         "{}: {} samples of {} s\n\n{:<16}{:<12}{:>14}{:>14}{:>12}{:>12}\n",
         design.name,
         design.scenario.steps,
-        design.controller.plant.sample_time,
+        design.plant.sample_time,
         "variant",
         "output",
         "MSE measured",

@@ -53,7 +53,7 @@ fn line(name: impl Into<String>, value: impl Into<String>) -> (String, String) {
 }
 
 fn overview(design: &Design) -> Vec<(String, String)> {
-    let plant = &design.controller.plant;
+    let plant = &design.plant;
     let dims = plant.dimensions();
     let names: Vec<&str> = plant.modes.iter().map(|mode| mode.name.as_str()).collect();
     let survival = design
@@ -91,7 +91,7 @@ fn feedback(design: &Design, control: &StateFeedback) -> Vec<(String, String)> {
         line("latency", count(spec.latency, "sample")),
         line(
             "disturbance",
-            match assumes_input_disturbance(&design.controller.plant) {
+            match assumes_input_disturbance(&design.plant) {
                 true => "none is given (E, F): one at the inputs (E = B) is assumed",
                 false => "as given (E, F)",
             },
@@ -127,7 +127,7 @@ fn attenuation(control: &StateFeedback, mode: usize) -> String {
 
 /// The periods at which the tracking error vanishes beside its constant part.
 fn internal_model(design: &Design, control: &StateFeedback) -> Option<(String, String)> {
-    let sample_time = design.controller.plant.sample_time;
+    let sample_time = design.plant.sample_time;
     let angles = control.spec.resonators.iter();
     let periods: Vec<String> = angles
         .map(|angle| format!("{:.6} s", core::f64::consts::TAU / angle * sample_time))
@@ -196,7 +196,7 @@ fn estimator(design: &Design) -> Vec<(String, String)> {
             format!(
                 "{} ({} s)",
                 count(estimator.response_length, "sample"),
-                number(estimator.response_length as f64 * design.controller.plant.sample_time)
+                number(estimator.response_length as f64 * design.plant.sample_time)
             ),
         ));
     }
@@ -314,7 +314,7 @@ pub fn json(design: &Design, warnings: &[String]) -> String {
         "noise_gain": running.map(|r| r.noise_gain.clone()),
         "fault_gain": running.map(|r| r.fault_gain.clone()),
         "command_noise": running.map(|r| r.command_noise.clone()),
-        "disturbance": if assumes_input_disturbance(&design.controller.plant) { "assumed at the inputs (B)" } else { "given (E, F)" },
+        "disturbance": if assumes_input_disturbance(&design.plant) { "assumed at the inputs (B)" } else { "given (E, F)" },
         "lost_sensors": running.map(|r| running_loop::json(design, &r.lost)),
         "lost_sensors_minimum_dwell": design.controller.observer.minimum_dwell,
         "gamma_is_optimal": control.and_then(|c| (0..c.modes.len()).map(|mode| c.is_optimal(mode)).collect::<Option<Vec<_>>>()),

@@ -3,15 +3,15 @@
 use super::figure::{Figure, Mark, Series};
 use super::page::{Column, KeyNumber, Page, Row, Section, Table};
 use super::{demo, svg};
-use ftc_control::Controller;
 use ftc_control::parameters::{
-    Compensation, ControllerParameters, Estimator, EstimatorMethod, FeedbackGains, Gain, Limits,
-    Observer, ObserverKind, StateFeedback,
+    Compensation, Estimator, EstimatorMethod, FeedbackGains, Limits, Observer, ObserverKind,
+    StateFeedback,
 };
-use ftc_design::{Design, FORMAT, Signal, Signals};
+use ftc_control::{Controller, Matrix};
+use ftc_design::{ControllerDesign, Design, FORMAT, Signal, Signals};
 use ftc_plant::scenario::{FaultEvent, FaultKind, ModeInterval, Waveform};
 use ftc_plant::{Mode, OperatingPoint, SwitchedPlant};
-use ftc_plant::{Scenario, Truth};
+use ftc_plant::{Scenario, TruePlant};
 use ftc_simulate::{PlantSimulator, Trajectory, Variant, run};
 use nalgebra::DMatrix;
 use proptest::prelude::*;
@@ -37,7 +37,7 @@ fn signals(count: usize, symbol: &str, unit: Option<&str>) -> Vec<Signal> {
 
 /// The paper's example with the hand-made controller.
 fn paper(noise: f64) -> Design {
-    let controller = common::controller(common::Channel::State, noise);
+    let controller = common::controller_design(common::Channel::State, noise);
     Design {
         format: FORMAT,
         name: "paper".into(),
@@ -47,8 +47,9 @@ fn paper(noise: f64) -> Design {
             states: signals(2, "x", None),
             disturbances: Vec::new(),
         },
+        plant: common::plant(common::Channel::State),
         controller,
-        truth: Truth::default(),
+        true_plant: TruePlant::default(),
         synthesis: None,
         scenario: common::scenario(common::reference("levels"), noise, 1),
     }
@@ -57,6 +58,7 @@ fn paper(noise: f64) -> Design {
 /// A plant of first-order lags in any size, with a proportional-integral controller and no estimator.
 fn lags(outputs: usize, disturbances: usize, steps: u64) -> Design {
     let square = DMatrix::identity(outputs, outputs);
+    let diagonal = |value: f64| Matrix::identity(outputs).scaled(value);
     let mode = |pole: f64| Mode {
         name: String::new(),
         a: &square * pole,
@@ -67,14 +69,13 @@ fn lags(outputs: usize, disturbances: usize, steps: u64) -> Design {
         operating_point: OperatingPoint::zero(outputs, outputs, outputs),
     };
     let gains = FeedbackGains {
-        state_feedback: &square * -0.1,
-        integral: &square * 0.2,
-        feedforward: DMatrix::zeros(outputs, 0),
-        previous_input: DMatrix::zeros(outputs, 0),
-        anti_windup: DMatrix::zeros(outputs, outputs),
-        output_feedback: &square * -0.1,
+        state_feedback: diagonal(-0.1),
+        integral: diagonal(0.2),
+        feedforward: Matrix::zeros(outputs, 0),
+        previous_input: Matrix::zeros(outputs, 0),
+        anti_windup: diagonal(0.0),
+        output_feedback: diagonal(-0.1),
     };
-    let nothing = Gain(DMatrix::zeros(outputs, outputs));
     let plant = SwitchedPlant {
         sample_time: 0.01,
         modes: vec![mode(0.5), mode(0.7)],
@@ -89,7 +90,8 @@ fn lags(outputs: usize, disturbances: usize, steps: u64) -> Design {
             states: signals(outputs, "x", None),
             disturbances: Vec::new(),
         },
-        controller: ControllerParameters {
+        plant,
+        controller: ControllerDesign {
             feedback: StateFeedback {
                 tracked: (0..outputs).collect(),
                 latency: 0,
@@ -100,8 +102,8 @@ fn lags(outputs: usize, disturbances: usize, steps: u64) -> Design {
             observer: Observer {
                 kind: ObserverKind::Luenberger,
                 note: Some("no disturbance to decouple".into()),
-                gains: vec![Gain(&square * 0.4); 2],
-                decoupling: vec![vec![nothing; 2]; 2],
+                gains: vec![diagonal(0.4); 2],
+                decoupling: vec![vec![diagonal(0.0); 2]; 2],
                 lost: Vec::new(),
                 minimum_dwell: 0,
             },
@@ -122,9 +124,8 @@ fn lags(outputs: usize, disturbances: usize, steps: u64) -> Design {
             },
             compensation: Compensation::None,
             input_limits: vec![Limits::default(); outputs],
-            plant,
         },
-        truth: Truth::default(),
+        true_plant: TruePlant::default(),
         synthesis: None,
         scenario: Scenario {
             steps,
@@ -176,7 +177,7 @@ fn hostile(mut design: Design) -> Design {
         signal.name = format!("{HOSTILE} {}", "long ".repeat(30));
         signal.unit = Some(HOSTILE.into());
     }
-    for mode in &mut design.controller.plant.modes {
+    for mode in &mut design.plant.modes {
         mode.name = HOSTILE.into();
     }
     design.controller.observer.note = Some(HOSTILE.into());
@@ -184,8 +185,8 @@ fn hostile(mut design: Design) -> Design {
 }
 
 fn simulate(design: &Design) -> Vec<Trajectory> {
-    let plant = PlantSimulator::new(design.controller.plant.clone(), design.scenario.clone());
-    let controller = Controller::new(design.controller.clone());
+    let plant = PlantSimulator::new(design.plant.clone(), design.scenario.clone());
+    let controller = Controller::new(design.parameters()).unwrap();
     Variant::ALL
         .map(|variant| run(&plant, &controller, variant))
         .into()

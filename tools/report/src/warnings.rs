@@ -116,7 +116,7 @@ fn of_warning(file: &DesignFile, design: &Design, warning: &Warning) -> String {
                 "{}: mode {} ({}), {}: {}",
                 shorten(database.map_or("", |files| file_of(files, mode))),
                 mode + 1,
-                design.controller.plant.modes[mode].name,
+                design.plant.modes[mode].name,
                 design.signals.outputs[output].name,
                 of_doubt(doubt)
             )

@@ -176,12 +176,10 @@ fn attempt(design: &Design, case: Case) -> Result<Trial, String> {
         })
         .into_iter()
         .collect();
-    let plant = PlantSimulator::with_truth(
-        design.controller.plant.clone(),
-        design.truth.clone(),
-        scenario,
-    );
-    let controller = Controller::new(design.controller.clone());
+    let plant =
+        PlantSimulator::with_true_plant(design.plant.clone(), design.true_plant.clone(), scenario);
+    let controller =
+        Controller::new(design.parameters()).expect("a finished design has matching sizes");
     let trajectories = COMPARED
         .into_iter()
         .map(|variant| match variant {
@@ -228,7 +226,7 @@ fn predict(
         disturbance: vec![1.0; design.scenario.disturbance.len()],
         horizon,
     };
-    let mut predictive = Predictive::new(&controller.plant, &spec, plant.initial_state().mode)?;
+    let mut predictive = Predictive::new(&design.plant, &spec, plant.initial_state().mode)?;
     Ok(run_with(plant, &mut predictive, Variant::Predictive, false))
 }
 

@@ -91,8 +91,8 @@ pub fn curve(run: &Trajectory, sample_time: f64, signal: impl Fn(&Record) -> f64
 
 /// Vertical lines where the mode changes.
 pub fn switches(run: &Trajectory, design: &Design) -> Vec<Mark> {
-    let te = design.controller.plant.sample_time;
-    let modes = &design.controller.plant.modes;
+    let te = design.plant.sample_time;
+    let modes = &design.plant.modes;
     run.records
         .windows(2)
         .filter(|pair| pair[0].mode != pair[1].mode)
@@ -110,7 +110,7 @@ pub fn figure(
     (key, title, label): (String, String, String),
     intervals: &[[usize; 2]],
 ) -> Figure {
-    let te = design.controller.plant.sample_time;
+    let te = design.plant.sample_time;
     let shaded = intervals
         .iter()
         .map(|interval| interval.map(|index| index as f64 * te))

@@ -144,14 +144,14 @@ impl Designs {
     fn controller(&self, controller: ControllerKind) -> ControllerParameters {
         match controller {
             ControllerKind::Proposed | ControllerKind::ToldTheFault | ControllerKind::NoFtc => {
-                self.proposed.controller.clone()
+                self.proposed.parameters()
             }
             ControllerKind::PrintedCompensation => ControllerParameters {
                 compensation: Compensation::Additive,
-                ..self.proposed.controller.clone()
+                ..self.proposed.parameters()
             },
-            ControllerKind::AdditiveReference => self.additive.controller.clone(),
-            ControllerKind::AdditiveSliding => self.sliding.controller.clone(),
+            ControllerKind::AdditiveReference => self.additive.parameters(),
+            ControllerKind::AdditiveSliding => self.sliding.parameters(),
         }
     }
 
@@ -159,10 +159,11 @@ impl Designs {
     fn run_all(&self, reference: &[Waveform]) -> Vec<(ControllerKind, Trajectory)> {
         let mut scenario = self.proposed.scenario.clone();
         scenario.reference = reference.to_vec();
-        let plant = PlantSimulator::new(self.proposed.controller.plant.clone(), scenario);
+        let plant = PlantSimulator::new(self.proposed.plant.clone(), scenario);
         ControllerKind::ALL
             .map(|kind| {
-                let controller = Controller::new(self.controller(kind));
+                let controller = Controller::new(self.controller(kind))
+                    .expect("a finished design has matching sizes");
                 (kind, simulate(&plant, &controller, kind.variant()))
             })
             .into()

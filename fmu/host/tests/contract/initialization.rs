@@ -10,7 +10,7 @@ use ftc_design::Design;
 /// The example, its second mode at rest elsewhere.
 fn two_resting_places() -> Design {
     let mut design = example();
-    let point = &mut design.controller.plant.modes[1].operating_point;
+    let point = &mut design.plant.modes[1].operating_point;
     (point.x, point.u, point.y) = (vec![0.5, 0.1], vec![0.25, -0.5], vec![0.75, 0.3]);
     design
 }

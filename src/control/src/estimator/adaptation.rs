@@ -15,8 +15,10 @@
 //!   database alone, both judged before learning from the sample.
 
 use crate::kernel;
+use crate::matrix::Matrix;
 use crate::parameters::Predictor;
-use nalgebra::DMatrix;
+use alloc::vec;
+use alloc::vec::Vec;
 use serde::{Deserialize, Serialize};
 
 /// Share of the past in the running mean of squared errors.
@@ -148,14 +150,44 @@ fn remember(mean: &mut f64, error: f64) {
 }
 
 /// `(R'R)^-1`, row after row: what the database leaves open.
-fn covariance(factor: &DMatrix<f64>) -> Vec<f64> {
+fn covariance(factor: &Matrix) -> Vec<f64> {
     let size = factor.nrows();
-    let inverse = factor
-        .solve_upper_triangular(&DMatrix::identity(size, size))
-        .unwrap_or_else(|| DMatrix::zeros(size, size));
-    let product = &inverse * inverse.transpose();
-    let covariance = 0.5 * (&product + product.transpose());
-    covariance.iter().map(|&v| kernel::bounded(v)).collect()
+    let inverse = inverse_rows(factor);
+    let row = |index: usize| &inverse[index * size..(index + 1) * size];
+    let mut covariance = vec![0.0; size * size];
+    for i in 0..size {
+        for j in i..size {
+            // Of an upper triangle, what stands left of the diagonal is zero.
+            let entry = kernel::bounded(kernel::dot(&row(i)[j..], &row(j)[j..]));
+            covariance[i * size + j] = entry;
+            covariance[j * size + i] = entry;
+        }
+    }
+    covariance
+}
+
+/// The inverse of an upper triangular matrix, row after row, by back substitution; zero where it is
+/// singular.
+fn inverse_rows(factor: &Matrix) -> Vec<f64> {
+    let size = factor.nrows();
+    let mut inverse = vec![0.0; size * size];
+    if factor.ncols() != size || (0..size).any(|i| factor.get(i, i).is_none_or(|d| d == 0.0)) {
+        return inverse;
+    }
+    for index in (0..size).rev() {
+        let (row, below) = inverse[index * size..].split_at_mut(size);
+        row[index] = 1.0;
+        for (k, entry) in factor.row(index).enumerate().skip(index + 1) {
+            kernel::add_scaled(
+                row,
+                -entry,
+                &below[(k - index - 1) * size..(k - index) * size],
+            );
+        }
+        let pivot = factor.as_slice()[index * size + index];
+        row.iter_mut().for_each(|value| *value /= pivot);
+    }
+    inverse
 }
 
 #[cfg(test)]
@@ -164,8 +196,8 @@ mod tests {
 
     fn predictor(response: &[f64], information: f64) -> Predictor {
         Predictor {
-            response: DMatrix::from_row_slice(1, response.len(), response),
-            factor: DMatrix::identity(response.len(), response.len()) * information.sqrt(),
+            response: Matrix::from_fn(1, response.len(), |_, column| response[column]),
+            factor: Matrix::identity(response.len()).scaled(information.sqrt()),
             deviation: vec![0.01],
             samples: 100,
         }
@@ -184,6 +216,17 @@ mod tests {
             adaptation.learn(&phi, &[error]);
         }
         last
+    }
+
+    #[test]
+    fn the_covariance_is_the_inverse_of_the_gram_matrix() {
+        let factor = Matrix::from_rows(&[[2.0, 1.0, -3.0], [0.0, 4.0, 0.5], [0.0, 0.0, -1.0]]);
+        let r = nalgebra::DMatrix::from_column_slice(3, 3, factor.as_slice());
+        let wanted = (r.transpose() * r).try_inverse().unwrap();
+        for (got, want) in covariance(&factor).iter().zip(wanted.iter()) {
+            assert!((got - want).abs() < 1e-12, "{got} for {want}");
+        }
+        assert_eq!(covariance(&Matrix::zeros(2, 2)), [0.0; 4]);
     }
 
     #[test]

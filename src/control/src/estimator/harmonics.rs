@@ -7,6 +7,8 @@
 
 use crate::kernel;
 use crate::parameters::{Harmonics, PhasorMap};
+use alloc::vec;
+use alloc::vec::Vec;
 use serde::{Deserialize, Serialize};
 
 /// Learned coefficients of one mode, with `q = 2 x harmonics` regressors.
@@ -128,10 +130,9 @@ impl HarmonicState {
             let (sine, cosine) = (2 * harmonic, 2 * harmonic + 1);
             for (row, to) in self.coefficients.chunks_exact_mut(size).enumerate() {
                 for (column, from) in other.coefficients.chunks_exact(size).enumerate() {
-                    let (Some(&re), Some(&im)) = (
-                        map.real.get((row, column)),
-                        map.imaginary.get((row, column)),
-                    ) else {
+                    let (Some(re), Some(im)) =
+                        (map.real.get(row, column), map.imaginary.get(row, column))
+                    else {
                         continue;
                     };
                     if let (Some(&a), Some(&b)) = (from.get(sine), from.get(cosine)) {

@@ -16,6 +16,8 @@ mod recovery;
 mod window;
 
 pub use adaptation::Adaptation;
+use alloc::vec;
+use alloc::vec::Vec;
 pub use decision::{Decision, Verdict};
 pub use harmonics::HarmonicState;
 pub use predictor::{InputHistory, leverage};

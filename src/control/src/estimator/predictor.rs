@@ -1,7 +1,9 @@
 //! The regressor of past inputs and how far it lies from the healthy database.
 
 use crate::kernel;
-use nalgebra::DMatrix;
+use crate::matrix::Matrix;
+use alloc::vec;
+use alloc::vec::Vec;
 use serde::{Deserialize, Serialize};
 
 /// The last `j` acting inputs, oldest first: the paper's `u_bar(k)` of (42) without `u(k)`,
@@ -61,7 +63,7 @@ impl InputHistory {
     }
 
     /// The leverage of the present regressor.
-    pub fn leverage(&mut self, factor: &DMatrix<f64>) -> f64 {
+    pub fn leverage(&mut self, factor: &Matrix) -> f64 {
         leverage(factor, &self.regressor, &mut self.whitened)
     }
 }
@@ -70,11 +72,9 @@ impl InputHistory {
 ///
 /// `factor` is `R` (q x q, upper triangular), `whitened` scratch (q). Forward substitution reads
 /// the columns of `R`, which lie contiguous.
-pub fn leverage(factor: &DMatrix<f64>, regressor: &[f64], whitened: &mut [f64]) -> f64 {
-    let size = factor.nrows().max(1);
+pub fn leverage(factor: &Matrix, regressor: &[f64], whitened: &mut [f64]) -> f64 {
     let mut sum = 0.0;
-    let columns = factor.as_slice().chunks_exact(size);
-    for (index, (column, &entry)) in columns.zip(regressor).enumerate() {
+    for (index, (column, &entry)) in factor.columns().zip(regressor).enumerate() {
         let (solved, rest) = whitened.split_at_mut(index.min(whitened.len()));
         let (above, diagonal) = column.split_at(index.min(column.len()));
         let (Some(value), Some(&pivot)) = (rest.first_mut(), diagonal.first()) else {
@@ -89,6 +89,7 @@ pub fn leverage(factor: &DMatrix<f64>, regressor: &[f64], whitened: &mut [f64]) 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use nalgebra::DMatrix;
     use proptest::prelude::*;
 
     proptest! {
@@ -100,7 +101,8 @@ mod tests {
             let factor = data.clone().qr().r();
             prop_assume!(factor.diagonal().iter().all(|d| d.abs() > 0.05));
             let phi = &phi[..size];
-            let got = leverage(&factor, phi, &mut vec![0.0; size]);
+            let plain = Matrix::from_fn(size, size, |r, c| factor[(r, c)]);
+            let got = leverage(&plain, phi, &mut vec![0.0; size]);
             let v = nalgebra::DVector::from_column_slice(phi);
             let want = (v.transpose() * (data.transpose() * &data).try_inverse().unwrap() * &v)[0];
             prop_assert!((got - want).abs() <= 1e-7 * (1.0 + want));

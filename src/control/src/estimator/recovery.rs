@@ -9,6 +9,8 @@
 
 use crate::kernel;
 use crate::parameters::Harmonics;
+use alloc::vec;
+use alloc::vec::Vec;
 use serde::{Deserialize, Serialize};
 
 /// A constant, or a root mean square of the unexplained, below this share of the threshold is none.

@@ -9,6 +9,8 @@
 //! residual once it fills the window.
 
 use crate::kernel;
+use alloc::vec;
+use alloc::vec::Vec;
 use serde::{Deserialize, Serialize};
 
 /// Directions shorter than this fraction of the longest row carry no information.

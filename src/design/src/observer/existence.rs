@@ -1,6 +1,7 @@
 //! When an unknown input observer exists: `rank(C E) = rank(E)` and `(C, T A)` detectable.
 
 use crate::augmented::scaled;
+use crate::matrices::dense;
 use crate::pseudo_inverse;
 use ftc_plant::{Mode, SwitchedPlant};
 use nalgebra::DMatrix;
@@ -116,7 +117,7 @@ pub(crate) fn check_decoupling(
     for (i, left) in plant.modes.iter().enumerate() {
         for (j, entered) in plant.modes.iter().enumerate() {
             let e = units.e(left);
-            let h = units.h(&design.observer.decoupling[i][j].0);
+            let h = units.h(&dense(&design.observer.decoupling[i][j]));
             let through = &e - &h * (units.c(entered) * &e);
             if through.amax() > 1e-9 * h.amax().max(1.0) {
                 return Err(format!(

@@ -13,10 +13,12 @@ use crate::certificate::{
     scaled_plant,
 };
 use crate::lyapunov::all_pairs;
+use crate::matrices::dense;
 use crate::verdict::BlockKind;
+use ftc_control::Matrix;
 #[cfg(feature = "solver")]
 use ftc_control::parameters::Observer;
-use ftc_control::parameters::{Gain, LostSet, ObserverKind};
+use ftc_control::parameters::{LostSet, ObserverKind};
 use ftc_plant::SwitchedPlant;
 use nalgebra::DMatrix;
 use serde::{Deserialize, Serialize};
@@ -95,12 +97,12 @@ pub(crate) fn corrected_error(
     plant: &SwitchedPlant,
     design: &ObserverDesign,
     mode: usize,
-    gain: &Gain,
+    gain: &Matrix,
 ) -> Enclosure {
     let (states, outputs) = (&design.certificate.states, &design.certificate.outputs);
     let a = scaled_plant(&plant.modes[mode].a, states, states);
     let c = scaled_plant(&plant.modes[mode].c, outputs, states);
-    let h = scaled_plant(&gain.0, states, outputs);
+    let h = scaled_plant(&dense(gain), states, outputs);
     &a - &(&(&a * &h) * &c)
 }
 
@@ -208,7 +210,7 @@ pub(crate) fn changes(
     for (i, j) in all_pairs(modes) {
         let a = scaled_plant(&plant.modes[i].a, states, states);
         let outputs = &design.certificate.outputs;
-        let h = scaled_plant(&design.observer.decoupling[i][j].0, states, outputs);
+        let h = scaled_plant(&dense(&design.observer.decoupling[i][j]), states, outputs);
         let c = scaled_plant(&plant.modes[j].c, outputs, states);
         let entered = identity - &(&h * &c);
         for list in matrices {
@@ -223,9 +225,7 @@ pub(crate) fn changes(
 #[cfg(feature = "solver")]
 pub(crate) fn gains_fit(observer: &Observer) -> bool {
     let gains = observer.lost.iter().flat_map(|set| &set.correction);
-    gains
-        .into_iter()
-        .all(|gain| gain.0.iter().all(|value| value.is_finite()))
+    gains.into_iter().all(Matrix::is_finite)
 }
 
 /// Everything [`verify`] indexes has the size it must have.
@@ -239,9 +239,9 @@ fn check_sizes(
     let asked = sets(p);
     let lost = &design.observer.lost;
     let listed = |set: &LostSet| {
-        let silent = |gain: &Gain| {
-            gain.0.shape() == (n, p) && {
-                let mut columns = set.sensors.iter().map(|&k| gain.0.column(k).amax());
+        let silent = |gain: &Matrix| {
+            gain.shape() == (n, p) && {
+                let mut columns = set.sensors.iter().map(|&k| dense(gain).column(k).amax());
                 columns.all(|largest| largest == 0.0)
             }
         };

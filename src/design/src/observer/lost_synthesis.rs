@@ -11,9 +11,10 @@ use super::{ObserverDesign, PerUnit};
 use crate::augmented::scaled;
 use crate::certificate::{Enclosure, LyapunovMatrix, largest_ratio};
 use crate::lmi::{Inequality, Problem};
+use crate::matrices::{dense, plain};
 use crate::riccati;
 use crate::verdict::{BlockKind, BlockName};
-use ftc_control::parameters::{Gain, LostSet, ObserverKind};
+use ftc_control::parameters::{LostSet, ObserverKind};
 use ftc_plant::{SwitchedPlant, spectral_radius};
 use nalgebra::DMatrix;
 
@@ -147,7 +148,7 @@ pub(super) fn add(
         let units = per_unit(&design);
         let numbered = filters.iter().enumerate();
         numbered
-            .map(|(i, filter)| filter.error(&units.h(&design.observer.decoupling[i][i].0)))
+            .map(|(i, filter)| filter.error(&units.h(&dense(&design.observer.decoupling[i][i]))))
             .collect()
     });
     let candidates = Candidates {
@@ -285,7 +286,7 @@ impl Found {
         let units = &design.certificate;
         let outward: Vec<f64> = units.states.iter().map(|unit| 1.0 / unit).collect();
         let inward: Vec<f64> = units.outputs.iter().map(|unit| 1.0 / unit).collect();
-        let physical = |gain: &DMatrix<f64>| Gain(scaled(gain, &outward, &inward));
+        let physical = |gain: &DMatrix<f64>| plain(&scaled(gain, &outward, &inward));
         let set = |(sensors, gains): (Vec<usize>, Vec<DMatrix<f64>>)| LostSet {
             sensors,
             correction: gains.iter().map(physical).collect(),

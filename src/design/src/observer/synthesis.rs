@@ -8,10 +8,12 @@ use super::{ObserverCertificate, ObserverDesign};
 use crate::augmented::scaled;
 use crate::certificate::{LyapunovMatrix, observer_growth};
 use crate::lmi::{Affine, Inequality, Problem, Variable};
+use crate::matrices::plain;
 use crate::units::power_of_two;
 use crate::verdict::{BlockKind, BlockName, DesignError, SolverFailure, infeasible};
 use crate::{Advice, DwellTime, Lyapunov, ObserverChoice, ObserverSpec};
-use ftc_control::parameters::{Gain, Observer, ObserverKind};
+use ftc_control::Matrix;
+use ftc_control::parameters::{Observer, ObserverKind};
 use ftc_plant::scaling::Scaling;
 use ftc_plant::{Dimensions, SwitchedPlant, spectral_radius};
 use nalgebra::DMatrix;
@@ -311,7 +313,7 @@ impl Parts {
         kind: ObserverKind,
         note: Option<String>,
     ) -> Result<ObserverDesign, DesignError> {
-        let wrap = |row: Vec<DMatrix<f64>>| row.into_iter().map(Gain).collect();
+        let wrap = |row: Vec<DMatrix<f64>>| row.iter().map(plain).collect();
         let mut found = ObserverDesign {
             spec: spec.clone(),
             spectral_radius: self.radius,
@@ -391,8 +393,8 @@ impl Candidate {
     /// The Kalman filter of a ratio; `None` where it does not exist.
     fn filter(filters: &[Filtered], units: &OwnedUnits, ratio: f64) -> Option<Self> {
         let gains = filters.iter().map(|filter| filter.gain(&[], ratio));
-        let physical = |gain: DMatrix<f64>| Gain(units.physical(&gain));
-        let gains: Vec<Gain> = gains
+        let physical = |gain: DMatrix<f64>| plain(&units.physical(&gain));
+        let gains: Vec<Matrix> = gains
             .map(|gain| gain.map(physical))
             .collect::<Option<_>>()?;
         let none = DMatrix::zeros(filters[0].a.nrows(), filters[0].c.nrows());
@@ -400,7 +402,7 @@ impl Candidate {
             observer: Observer {
                 kind: ObserverKind::Kalman,
                 note: None,
-                gains: vec![Gain(none); filters.len()],
+                gains: vec![plain(&none); filters.len()],
                 decoupling: vec![gains; filters.len()],
                 lost: Vec::new(),
                 minimum_dwell: 0,

@@ -16,8 +16,10 @@
 
 use crate::augmented::{AugmentedMode, augment, design_disturbance, readings};
 use crate::certificate::{Enclosure, scaled_gain, scaled_plant};
+use crate::matrices::dense;
 use crate::{StateFeedback, Units};
-use ftc_control::parameters::{Gain, Observer, ObserverKind};
+use ftc_control::Matrix;
+use ftc_control::parameters::{Observer, ObserverKind};
 use ftc_plant::SwitchedPlant;
 use nalgebra::DMatrix;
 
@@ -117,10 +119,10 @@ impl<'a> Models<'a> {
     }
 
     /// The loop of a mode with an observer in correction form without the sensors in `lost`.
-    pub fn corrected(&self, mode: usize, gain: &Gain, lost: &[usize]) -> Loop {
+    pub fn corrected(&self, mode: usize, gain: &Matrix, lost: &[usize]) -> Loop {
         let parts = self.parts(mode);
         let units = self.units();
-        let h = scaled_plant(&gain.0, &units.states, &units.outputs);
+        let h = scaled_plant(&dense(gain), &units.states, &units.outputs);
         let (n, p) = h.shape();
         let identity = |size| Enclosure::exact(DMatrix::identity(size, size));
         let chosen = |wanted: bool| {
@@ -190,12 +192,12 @@ impl<'a> Models<'a> {
 
     /// The loop of a mode followed by `next`, with an injection; of what a sensor adds, only while the
     /// mode lasts.
-    fn injected(&self, mode: usize, next: usize, injection: &Gain, correction: &Gain) -> Loop {
+    fn injected(&self, mode: usize, next: usize, injection: &Matrix, correction: &Matrix) -> Loop {
         let parts = self.parts(mode);
         let units = self.units();
         let (x, y) = (&units.states, &units.outputs);
-        let h = scaled_plant(&correction.0, x, y);
-        let l = scaled_plant(&injection.0, x, y);
+        let h = scaled_plant(&dense(correction), x, y);
+        let l = scaled_plant(&dense(injection), x, y);
         let c_next = scaled_plant(&self.plant.modes[next].c, y, x);
         let b = &parts.model[1];
         let projected = &parts.a - &(&h * &(&c_next * &parts.a));

@@ -20,9 +20,9 @@ pub fn additive(design: &Design) -> Result<ControllerParameters, DesignError> {
         ..synthesis.state_feedback.spec.clone()
     };
     let ours = &design.controller.feedback;
-    let plant = &design.controller.plant;
+    let plant = &design.plant;
     let control = state_feedback::synthesise(plant, &spec, &scaling(&design.signals))?;
-    let mut parameters = design.controller.clone();
+    let mut parameters = design.parameters();
     parameters.compensation = Compensation::Additive;
     parameters.feedback = feedback(
         &control,

@@ -3,7 +3,7 @@
 use super::predictive::{Predictive, PredictiveSpec};
 use super::{additive, deadbeat_bound, response_delay};
 use crate::{PlantSimulator, Trajectory, Variant, run, run_with};
-use ftc_control::Controller;
+use ftc_control::{Controller, ControllerError};
 use ftc_design::{Design, DesignError};
 
 /// Samples the predictive controller looks ahead.
@@ -18,6 +18,9 @@ pub enum BaselineError {
     /// There are no gains for the additive control.
     #[error("the additive baseline: {0}")]
     Additive(#[from] DesignError),
+    /// The additive control does not fit the plant.
+    #[error("the additive baseline: {0}")]
+    Controller(#[from] ControllerError),
     /// There is no predictive controller.
     #[error("the predictive baseline: {0}")]
     Predictive(String),
@@ -35,11 +38,11 @@ pub fn trajectories(
     plant: &PlantSimulator,
 ) -> Result<Vec<Trajectory>, BaselineError> {
     let parameters = additive(design)?;
-    let printed = run(plant, &Controller::new(parameters), Variant::Additive);
+    let printed = run(plant, &Controller::new(parameters)?, Variant::Additive);
     let delayed = design.controller.feedback.latency > 0;
     let spec = predictive(design, &printed)?;
     let mode = plant.initial_state().mode;
-    let mut controller = Predictive::new(&design.controller.plant, &spec, mode)
+    let mut controller = Predictive::new(&design.plant, &spec, mode)
         .map_err(|error| BaselineError::Predictive(error.to_string()))?;
     if delayed {
         controller = controller.one_sample_late();
@@ -59,7 +62,7 @@ fn predictive(design: &Design, played: &Trajectory) -> Result<PredictiveSpec, Ba
         .spec;
     let outputs = design.signals.outputs.iter();
     let noise = outputs.zip(&design.scenario.noise);
-    let channels = design.controller.plant.dimensions().disturbances;
+    let channels = design.plant.dimensions().disturbances;
     let power = |channel: usize| {
         let records = &played.records;
         let sum: f64 = records.iter().map(|r| r.disturbance[channel].powi(2)).sum();
@@ -86,7 +89,7 @@ pub fn bound(design: &Design, played: &Trajectory) -> Vec<f64> {
         .map(|(index, &output)| {
             let reference: Vec<f64> = played.records.iter().map(|r| r.reference[index]).collect();
             let start = played.records.first().map_or(0.0, |r| r.y_true[output]);
-            let delay = response_delay(&design.controller.plant, output) + feedback.latency;
+            let delay = response_delay(&design.plant, output) + feedback.latency;
             deadbeat_bound(&reference, start, delay)
         })
         .collect()

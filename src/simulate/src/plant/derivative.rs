@@ -6,7 +6,7 @@
 use super::rectifier;
 use super::{External, PlantSimulator, PlantState};
 use ftc_control::kernel;
-use ftc_plant::Truth;
+use ftc_plant::TruePlant;
 use ftc_plant::scenario::{FaultEvent, FaultKind};
 
 /// Small changes of the plant's inputs.
@@ -59,7 +59,7 @@ impl PlantSimulator {
 
     /// Advances the state, and leaves its change in the scratch.
     fn differentiate_state(&self, trial: &mut PlantState, u: &[f64], change: &Change<'_>) {
-        if let Truth::Rectifier(rectifier) = &self.truth {
+        if let TruePlant::Rectifier(rectifier) = &self.true_plant {
             rectifier::differentiate_rectifier(
                 rectifier,
                 trial.mode,
@@ -75,7 +75,7 @@ impl PlantSimulator {
         } else {
             let _ = self.advance(trial, u);
             trial.next.fill(0.0);
-            let Some((mode, _)) = self.described(trial.mode) else {
+            let Some(mode) = self.modes.get(trial.mode) else {
                 return;
             };
             kernel::add_product(&mut trial.next, &mode.b, change.command);
@@ -105,7 +105,7 @@ impl PlantSimulator {
         moved: bool,
     ) {
         trial.y_true.fill(0.0);
-        let Some((mode, _)) = self.described(trial.mode) else {
+        let Some(mode) = self.modes.get(trial.mode) else {
             return;
         };
         if moved {

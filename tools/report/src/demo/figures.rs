@@ -238,7 +238,7 @@ impl<'a> Scene<'a> {
     }
 
     fn time(&self, tick: u64) -> f64 {
-        tick as f64 * self.design.controller.plant.sample_time
+        tick as f64 * self.design.plant.sample_time
     }
 
     fn times(&self, intervals: &[[usize; 2]]) -> Vec<[f64; 2]> {
@@ -253,7 +253,7 @@ impl<'a> Scene<'a> {
         let Some(run) = self.main else {
             return Vec::new();
         };
-        let modes = &self.design.controller.plant.modes;
+        let modes = &self.design.plant.modes;
         run.records
             .windows(2)
             .filter(|pair| pair[0].mode != pair[1].mode)

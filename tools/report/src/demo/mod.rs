@@ -143,7 +143,7 @@ pub fn page(design: &Design, trajectories: &[Trajectory], warnings: &[String]) -
 
 /// What happened, in a few sentences.
 fn lead(design: &Design, trajectories: &[Trajectory]) -> String {
-    let plant = &design.controller.plant;
+    let plant = &design.plant;
     let Some(run) = find(trajectories, Variant::Ftc).or(trajectories.first()) else {
         return "Nothing was simulated.".into();
     };

@@ -94,7 +94,7 @@ fn explanation(variant: Variant) -> &'static str {
 /// The modes: open loop, closed loop as certified, healthy database.
 pub fn modes(design: &Design) -> Table {
     let controller = &design.controller;
-    let modes = &controller.plant.modes;
+    let modes = &design.plant.modes;
     let control = design
         .synthesis
         .as_ref()
@@ -158,7 +158,7 @@ pub fn modes(design: &Design) -> Table {
 pub fn sensors(design: &Design) -> Table {
     let outputs = &design.signals.outputs;
     let controller = &design.controller;
-    let rows = (0..controller.plant.dimensions().outputs)
+    let rows = (0..design.plant.dimensions().outputs)
         .map(|sensor| {
             let threshold = controller.estimator.thresholds.get(sensor);
             let noise = design.scenario.noise.get(sensor);

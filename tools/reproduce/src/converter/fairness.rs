@@ -7,11 +7,8 @@ use super::*;
 fn healthy(design: &Design, horizon: usize, input_weight: f64) -> [f64; 2] {
     let mut scenario = design.scenario.clone();
     scenario.events.clear();
-    let plant = PlantSimulator::with_truth(
-        design.controller.plant.clone(),
-        design.truth.clone(),
-        scenario,
-    );
+    let plant =
+        PlantSimulator::with_true_plant(design.plant.clone(), design.true_plant.clone(), scenario);
     let run = predict(design, &plant, horizon, input_weight).unwrap();
     let merits = merits(&run, design);
     [merits[0].truth.vaf, merits[1].truth.vaf]

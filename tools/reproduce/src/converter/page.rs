@@ -3,7 +3,7 @@
 use super::{COMPARED, FAULTY, HORIZON, INPUT_WEIGHT, REPORTED, Trial, name};
 use crate::experiment::{OutputMerits, curve, figure};
 use ftc_design::Design;
-use ftc_plant::Truth;
+use ftc_plant::TruePlant;
 use ftc_simulate::closed_loop::Record;
 use ftc_simulate::{Trajectory, Variant};
 use report::events::fault_intervals;
@@ -316,7 +316,7 @@ fn response(
     others: &[&Trajectory],
     sensor: usize,
 ) -> Figure {
-    let te = design.controller.plant.sample_time;
+    let te = design.plant.sample_time;
     let output = &design.signals.outputs[sensor].name;
     let mut figure = figure(
         run,
@@ -338,7 +338,7 @@ fn response(
 }
 
 fn estimate(design: &Design, trial: &Trial, run: &Trajectory, sensor: usize) -> Figure {
-    let te = design.controller.plant.sample_time;
+    let te = design.plant.sample_time;
     let truth = curve(run, te, |record| {
         if record.y[sensor].is_finite() {
             record.fault[sensor]
@@ -407,7 +407,7 @@ fn all(trials: &[Trial]) -> Table {
 fn facts(design: &Design) -> Vec<(String, String)> {
     let mut facts = Vec::new();
     let mut fact = |name: &str, value: String| facts.push((name.to_string(), value));
-    if let Truth::Rectifier(plant) = &design.truth {
+    if let TruePlant::Rectifier(plant) = &design.true_plant {
         let loads: Vec<String> = plant.loads.iter().map(|load| number(*load)).collect();
         fact(
             "Plant",
@@ -436,7 +436,7 @@ fn facts(design: &Design) -> Vec<(String, String)> {
             format!("first order, {} s", number(plant.current_loop)),
         );
     }
-    let te = design.controller.plant.sample_time;
+    let te = design.plant.sample_time;
     let estimator = &design.controller.estimator;
     fact("Sample time", format!("{} s", number(te)));
     fact(

@@ -123,7 +123,7 @@ fn shown(shown: &Shown) -> Section {
 
 /// Figures 2 and 3: the outputs.
 fn response(shown: &Shown, output: usize) -> Option<Figure> {
-    let te = shown.design.controller.plant.sample_time;
+    let te = shown.design.plant.sample_time;
     let run = shown.of(ControllerKind::Proposed)?;
     let mut figure = figure(
         run,
@@ -150,7 +150,7 @@ fn response(shown: &Shown, output: usize) -> Option<Figure> {
 
 /// Figure 4: the fault and its estimates.
 fn estimate(shown: &Shown, sensor: usize) -> Option<Figure> {
-    let te = shown.design.controller.plant.sample_time;
+    let te = shown.design.plant.sample_time;
     let run = shown.of(ControllerKind::Proposed)?;
     let truth = curve(run, te, |record| record.fault[sensor]);
     let printed = curve(shown.of(ControllerKind::AdditiveSliding)?, te, |record| {
@@ -184,7 +184,7 @@ fn estimate(shown: &Shown, sensor: usize) -> Option<Figure> {
 
 /// Figures 5 and 6: the inputs.
 fn command(shown: &Shown, input: usize) -> Option<Figure> {
-    let te = shown.design.controller.plant.sample_time;
+    let te = shown.design.plant.sample_time;
     let run = shown.of(ControllerKind::Proposed)?;
     let mut figure = figure(
         run,

@@ -6,7 +6,7 @@ use ftc_control::estimator::SlidingWindow;
 use ftc_control::parameters::FeedbackGains;
 use ftc_design::as_printed::{PrintedVerdict, theorem_1, theorem_2};
 use ftc_design::assembly::Request;
-use ftc_design::{ControlSpec, DesignError, Lyapunov, StateFeedback, state_feedback};
+use ftc_design::{ControlSpec, DesignError, Lyapunov, StateFeedback, dense, state_feedback};
 use ftc_plant::scaling::Scaling;
 use ftc_plant::{Mode, SwitchedPlant, spectral_radius};
 use nalgebra::DMatrix;
@@ -184,9 +184,9 @@ fn delayed_radius(mode: &Mode, gains: &FeedbackGains, sample_time: f64) -> f64 {
     matrix.view_mut((n, n), (r, r)).fill_with_identity();
     matrix
         .view_mut((n + r, 0), (m, n))
-        .copy_from(&gains.state_feedback);
+        .copy_from(&dense(&gains.state_feedback));
     matrix
         .view_mut((n + r, n), (m, r))
-        .copy_from(&gains.integral);
+        .copy_from(&dense(&gains.integral));
     spectral_radius(&matrix)
 }

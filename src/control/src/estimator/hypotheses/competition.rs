@@ -4,6 +4,8 @@ use super::hypothesis::{Hypothesis, Kinds, Reading, Sensors, has};
 use super::linear::dot;
 use super::model::{Layout, ModeModel};
 use super::{Bank, BankState, FREEZING, KEEP, Live, RENEWED};
+use alloc::vec;
+use alloc::vec::Vec;
 use serde::{Deserialize, Serialize};
 
 /// How far below the best a hypothesis may fall before it is dropped, in log likelihood.

@@ -4,6 +4,8 @@ use super::linear::{axpy, dot, factor, solve};
 use super::model::{Layout, ModeModel};
 use crate::kernel::bounded;
 use crate::parameters::Hypotheses as Settings;
+use alloc::vec;
+use alloc::vec::Vec;
 use serde::{Deserialize, Serialize};
 
 /// A set of sensors, as bits.

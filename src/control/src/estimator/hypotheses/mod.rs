@@ -17,6 +17,7 @@ mod linear;
 mod model;
 mod start;
 
+use alloc::vec::Vec;
 pub use hypothesis::{Hypothesis, Reading, Sensors, has};
 pub use model::Layout;
 
@@ -183,7 +184,7 @@ impl Bank {
     pub fn observe(&self, state: &mut BankState, mode: usize, y: &[f64], thresholds: &[f64]) {
         let mut noise = core::mem::take(&mut state.noise);
         for (deviation, &threshold) in noise.iter_mut().zip(thresholds) {
-            *deviation = (threshold.abs() / SIGMAS).clamp(f64::MIN_POSITIVE.sqrt(), 1e100);
+            *deviation = (threshold.abs() / SIGMAS).clamp(1e-150, 1e100);
         }
         let mut valid = 0;
         for (q, &value) in y.iter().enumerate().take(Sensors::BITS as usize) {

@@ -1,6 +1,8 @@
 //! What the estimator knows beforehand: the plant per mode, and sizes and rates of what may happen.
 
 use super::linear::{multiply, multiply_transposed};
+use alloc::vec;
+use alloc::vec::Vec;
 
 /// Sizes of the parts of the joint state `[x; d; l; g; f]`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -2,49 +2,61 @@
 
 use super::competition::Candidates;
 use super::hypothesis::{Hypothesis, Innovation};
-use super::linear::{factor, solve};
+use super::linear::{axpy, factor, solve};
 use super::model::{Layout, ModeModel};
 use super::{Bank, BankState, Live, Prices, SLOTS};
-use crate::parameters::Hypotheses;
-use ftc_plant::{Mode, SwitchedPlant};
-use nalgebra::DMatrix;
+use crate::matrix::Matrix;
+use crate::parameters::{Channels, Hypotheses, ModeModel as Described};
+use alloc::vec;
+use alloc::vec::Vec;
 
 /// Standard deviation of loads and input gains at the start, relative to that of their jumps.
 const AT_REST: f64 = 0.3;
 
-fn rows(matrix: &DMatrix<f64>) -> Vec<f64> {
-    matrix.transpose().as_slice().to_vec()
+fn rows(matrix: &Matrix) -> Vec<f64> {
+    let (rows, columns) = matrix.shape();
+    let entry = |row, column| matrix.get(row, column).unwrap_or(0.0);
+    (0..rows)
+        .flat_map(|row| (0..columns).map(move |column| entry(row, column)))
+        .collect()
 }
 
 /// The exosystem's output through `channels` (rows x s): the sine of each harmonic of each channel.
-fn waves(channels: &DMatrix<f64>, harmonics: usize) -> Vec<f64> {
-    let mut out = DMatrix::zeros(channels.nrows(), 2 * harmonics * channels.ncols());
-    for channel in 0..channels.ncols() {
-        for harmonic in 0..harmonics {
-            out.set_column(
-                2 * (channel * harmonics + harmonic),
-                &channels.column(channel),
-            );
-        }
-    }
-    rows(&out)
+fn waves(channels: &Matrix, harmonics: usize) -> Vec<f64> {
+    let (count, columns) = channels.shape();
+    rows(&Matrix::from_fn(
+        count,
+        2 * harmonics * columns,
+        |row, wave| {
+            if wave % 2 == 0 {
+                channels
+                    .get(row, wave / 2 / harmonics.max(1))
+                    .unwrap_or(0.0)
+            } else {
+                0.0
+            }
+        },
+    ))
 }
 
-/// `(B'B)^-1 B'` (m x n), slightly regularised.
-fn left_inverse(b: &DMatrix<f64>) -> Vec<f64> {
-    let (n, m) = b.shape();
-    let gram = b.transpose() * b;
-    let ridge = 1e-12 * gram.trace() + f64::MIN_POSITIVE;
-    let mut lower = rows(&(gram + DMatrix::identity(m, m) * ridge));
+/// `(B'B)^-1 B'` (m x n, row after row) of `b` (n x m, row after row), slightly regularised.
+fn left_inverse(b: &[f64], n: usize, m: usize) -> Vec<f64> {
+    let mut lower = vec![0.0; m * m];
+    for row in b.chunks_exact(m) {
+        for (sums, &left) in lower.chunks_exact_mut(m).zip(row) {
+            axpy(sums, left, row);
+        }
+    }
+    let trace: f64 = (0..m).map(|j| lower[j * m + j]).sum();
+    for j in 0..m {
+        lower[j * m + j] += 1e-12 * trace + f64::MIN_POSITIVE;
+    }
     let mut out = vec![0.0; m * n];
     if !factor(&mut lower, m) {
         return out;
     }
-    let mut column = vec![0.0; m];
-    for i in 0..n {
-        for (value, &entry) in column.iter_mut().zip(b.row(i).iter()) {
-            *value = entry;
-        }
+    for (i, row) in b.chunks_exact(m).enumerate() {
+        let mut column = row.to_vec();
         solve(&lower, m, &mut column);
         for j in (0..m).rev() {
             for k in j + 1..m {
@@ -59,54 +71,70 @@ fn left_inverse(b: &DMatrix<f64>) -> Vec<f64> {
     out
 }
 
-fn model(layout: Layout, mode: &Mode, settings: &Hypotheses) -> ModeModel {
-    let Layout { n, p, .. } = layout;
-    let mut load = DMatrix::zeros(n, n);
-    for (channels, sizes) in [
+/// Covariance of a load's jump (n x n): through the inputs, the disturbance, and on the states.
+fn load(layout: Layout, mode: &Described, channels: &Channels, settings: &Hypotheses) -> Vec<f64> {
+    let n = layout.n;
+    let mut load = vec![0.0; n * n];
+    let sources = [
         (&mode.b, &settings.input_load),
-        (&mode.e, &settings.disturbance_load),
-    ] {
-        for (column, size) in channels.column_iter().zip(sizes) {
-            load += column * column.transpose() * (size * size);
+        (&channels.e, &settings.disturbance_load),
+    ];
+    for (matrix, sizes) in sources {
+        for (column, size) in matrix.as_slice().chunks_exact(n).zip(sizes) {
+            for (row, &left) in load.chunks_exact_mut(n).zip(column) {
+                axpy(row, left * size * size, column);
+            }
         }
     }
-    let still = DMatrix::identity(n, n) - &mode.a;
     for i in 0..n {
-        let moved = (0..n).map(|j| still[(i, j)] * settings.state_load[j]);
-        load[(i, i)] += moved.map(|v| v * v).sum::<f64>();
+        for j in 0..n {
+            let still = f64::from(i == j) - mode.a.get(i, j).unwrap_or(0.0);
+            let moved = still * settings.state_load[j];
+            load[i * n + i] += moved * moved;
+        }
     }
-    let bias = (0..p)
-        .map(|q| {
-            let parts = (0..n).map(|i| mode.c[(q, i)] * settings.state_size[i]);
-            0.25 * parts.map(|v| v * v).sum::<f64>()
-        })
-        .collect();
+    load
+}
+
+fn model(
+    layout: Layout,
+    mode: &Described,
+    channels: &Channels,
+    settings: &Hypotheses,
+) -> ModeModel {
+    let Layout { n, m, .. } = layout;
+    let (b, c) = (rows(&mode.b), rows(&mode.c));
+    let spread = |row: &[f64]| {
+        let parts = row.iter().zip(&settings.state_size);
+        0.25 * parts.map(|(c, size)| (c * size) * (c * size)).sum::<f64>()
+    };
+    let bias = c.chunks_exact(n).map(spread).collect();
+    let inverse = left_inverse(&b, n, m);
     let harmonics = settings.angles.len();
-    let point = &mode.operating_point;
     ModeModel::new(
         layout,
         rows(&mode.a),
-        rows(&mode.b),
-        rows(&mode.c),
-        waves(&mode.e, harmonics),
-        waves(&mode.f, harmonics),
-        (&point.x, &point.u, &point.y),
-        rows(&load),
+        b,
+        c,
+        waves(&channels.e, harmonics),
+        waves(&channels.f, harmonics),
+        (&mode.x0, &mode.u0, &mode.y0),
+        load(layout, mode, channels, settings),
         bias,
-        left_inverse(&mode.b),
+        inverse,
     )
 }
 
 impl Bank {
-    /// The estimator of `plant`; the sizes in `settings` must agree with it.
-    pub fn new(plant: &SwitchedPlant, settings: &Hypotheses) -> Self {
-        let dims = plant.dimensions();
-        let layout = Layout {
-            n: dims.states,
-            m: dims.inputs,
-            p: dims.outputs,
-            d: 2 * settings.angles.len() * dims.disturbances,
-        };
+    /// The estimator of a plant with these `modes`; the sizes in `settings` must agree with it.
+    pub fn new(modes: &[Described], settings: &Hypotheses) -> Self {
+        let (n, m, p) = modes.first().map_or((0, 0, 0), |mode| {
+            (mode.a.nrows(), mode.b.ncols(), mode.c.nrows())
+        });
+        let disturbances = settings.disturbance_load.len();
+        let d = 2 * settings.angles.len() * disturbances;
+        let layout = Layout { n, m, p, d };
+        let described = modes.iter().zip(&settings.channels);
         let ln = libm::log;
         let turn = |_| {
             settings
@@ -116,12 +144,10 @@ impl Bank {
         };
         Self {
             layout,
-            modes: plant
-                .modes
-                .iter()
-                .map(|mode| model(layout, mode, settings))
+            modes: described
+                .map(|(mode, channels)| model(layout, mode, channels, settings))
                 .collect(),
-            rotation: (0..dims.disturbances).flat_map(turn).collect(),
+            rotation: (0..disturbances).flat_map(turn).collect(),
             prices: Prices {
                 fault: ln(settings.fault_rate),
                 stuck: ln(settings.stuck_rate),

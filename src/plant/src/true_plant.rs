@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 /// The plant behind the sensors.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(tag = "kind", rename_all = "kebab-case")]
-pub enum Truth {
+pub enum TruePlant {
     /// Exactly the design model.
     #[default]
     AsDesigned,
@@ -20,7 +20,7 @@ pub enum Truth {
     Rectifier(Rectifier),
 }
 
-impl Truth {
+impl TruePlant {
     /// The linear matrices that describe the outputs, and the motion where it is linear.
     pub fn linear<'a>(&'a self, designed: &'a SwitchedPlant) -> &'a SwitchedPlant {
         match self {

@@ -1,0 +1,358 @@
+//! Whether every part of a controller has the size that the others ask for, and finite numbers.
+
+use crate::error::ControllerError;
+use crate::matrix::Matrix;
+use crate::parameters::{
+    ControllerParameters, Estimator, EstimatorMethod, Harmonics, Hypotheses, Limits, Observer,
+    Predictor, StateFeedback,
+};
+use alloc::format;
+use alloc::string::String;
+
+type Checked = Result<(), ControllerError>;
+
+/// Numbers of states `n`, inputs `m`, outputs `p` and modes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) struct Sizes {
+    pub states: usize,
+    pub inputs: usize,
+    pub outputs: usize,
+    pub modes: usize,
+}
+
+fn length(field: impl Into<String>, found: usize, needed: usize) -> Checked {
+    match found == needed {
+        true => Ok(()),
+        false => Err(ControllerError::Length {
+            field: field.into(),
+            found,
+            needed,
+        }),
+    }
+}
+
+fn finite(field: impl Into<String>, values: &[f64]) -> Checked {
+    match values.iter().all(|value| value.is_finite()) {
+        true => Ok(()),
+        false => Err(ControllerError::NotFinite {
+            field: field.into(),
+        }),
+    }
+}
+
+fn vector(field: &str, values: &[f64], needed: usize) -> Checked {
+    length(field, values.len(), needed)?;
+    finite(field, values)
+}
+
+fn shape(field: String, matrix: &Matrix, needed: (usize, usize)) -> Checked {
+    if matrix.shape() != needed {
+        return Err(ControllerError::Shape {
+            field,
+            found: matrix.shape(),
+            needed,
+        });
+    }
+    finite(field, matrix.as_slice())
+}
+
+fn range(holds: bool, field: impl Into<String>, rule: &'static str) -> Checked {
+    match holds {
+        true => Ok(()),
+        false => Err(ControllerError::Range {
+            field: field.into(),
+            rule,
+        }),
+    }
+}
+
+/// Checks everything, and returns the sizes that all parts agree on.
+pub(crate) fn check(parameters: &ControllerParameters) -> Result<Sizes, ControllerError> {
+    let sizes = modes(parameters)?;
+    feedback(&parameters.feedback, sizes)?;
+    observer(&parameters.observer, sizes)?;
+    estimator(&parameters.estimator, sizes)?;
+    length("input_limits", parameters.input_limits.len(), sizes.inputs)?;
+    for (index, limit) in parameters.input_limits.iter().enumerate() {
+        range(
+            ordered(limit),
+            format!("input_limits[{index}]"),
+            "must have numbers, min not above max",
+        )?;
+    }
+    Ok(sizes)
+}
+
+fn ordered(limit: &Limits) -> bool {
+    let (min, max) = (
+        limit.min.unwrap_or(f64::NEG_INFINITY),
+        limit.max.unwrap_or(f64::INFINITY),
+    );
+    min <= max
+}
+
+/// The plant's modes: all of the sizes of the first.
+fn modes(parameters: &ControllerParameters) -> Result<Sizes, ControllerError> {
+    let te = parameters.sample_time;
+    range(
+        te.is_finite() && te > 0.0,
+        "sample_time",
+        "must be a positive number of seconds",
+    )?;
+    let Some(first) = parameters.modes.first() else {
+        return Err(ControllerError::Range {
+            field: "modes".into(),
+            rule: "must hold at least one mode",
+        });
+    };
+    let (n, m, p) = (first.a.nrows(), first.b.ncols(), first.c.nrows());
+    range(
+        n > 0 && m > 0 && p > 0,
+        "modes[0]",
+        "must have at least one state, input and output",
+    )?;
+    for (index, mode) in parameters.modes.iter().enumerate() {
+        let field = |name: &str| format!("modes[{index}].{name}");
+        shape(field("a"), &mode.a, (n, n))?;
+        shape(field("b"), &mode.b, (n, m))?;
+        shape(field("c"), &mode.c, (p, n))?;
+        vector(&field("x0"), &mode.x0, n)?;
+        vector(&field("u0"), &mode.u0, m)?;
+        vector(&field("y0"), &mode.y0, p)?;
+    }
+    Ok(Sizes {
+        states: n,
+        inputs: m,
+        outputs: p,
+        modes: parameters.modes.len(),
+    })
+}
+
+fn feedback(feedback: &StateFeedback, sizes: Sizes) -> Checked {
+    let (n, m, p) = (sizes.states, sizes.inputs, sizes.outputs);
+    let (r, q) = (feedback.tracked.len(), feedback.integral_size());
+    range(
+        feedback.tracked.iter().all(|&row| row < p),
+        "feedback.tracked",
+        "must name outputs of the plant",
+    )?;
+    range(
+        feedback.latency <= 1,
+        "feedback.latency",
+        "must be 0 or 1 samples",
+    )?;
+    finite("feedback.resonators", &feedback.resonators)?;
+    length("feedback.modes", feedback.modes.len(), sizes.modes)?;
+    let directly = if feedback.has_feedforward() { r } else { 0 };
+    for (index, gains) in feedback.modes.iter().enumerate() {
+        let field = |name: &str| format!("feedback.modes[{index}].{name}");
+        let acting = feedback.latency * m;
+        shape(field("state_feedback"), &gains.state_feedback, (m, n))?;
+        shape(field("integral"), &gains.integral, (m, q))?;
+        shape(field("feedforward"), &gains.feedforward, (m, directly))?;
+        shape(field("previous_input"), &gains.previous_input, (m, acting))?;
+        shape(field("anti_windup"), &gains.anti_windup, (q, m))?;
+        shape(field("output_feedback"), &gains.output_feedback, (m, p))?;
+    }
+    Ok(())
+}
+
+fn observer(observer: &Observer, sizes: Sizes) -> Checked {
+    let gain = (sizes.states, sizes.outputs);
+    length("observer.gains", observer.gains.len(), sizes.modes)?;
+    for (index, matrix) in observer.gains.iter().enumerate() {
+        shape(format!("observer.gains[{index}]"), matrix, gain)?;
+    }
+    length(
+        "observer.decoupling",
+        observer.decoupling.len(),
+        sizes.modes,
+    )?;
+    for (from, row) in observer.decoupling.iter().enumerate() {
+        length(
+            format!("observer.decoupling[{from}]"),
+            row.len(),
+            sizes.modes,
+        )?;
+        for (to, matrix) in row.iter().enumerate() {
+            shape(format!("observer.decoupling[{from}][{to}]"), matrix, gain)?;
+        }
+    }
+    for (index, set) in observer.lost.iter().enumerate() {
+        let field = format!("observer.lost[{index}]");
+        range(
+            set.sensors.iter().all(|&sensor| sensor < sizes.outputs),
+            format!("{field}.sensors"),
+            "must name outputs of the plant",
+        )?;
+        length(
+            format!("{field}.correction"),
+            set.correction.len(),
+            sizes.modes,
+        )?;
+        for matrix in &set.correction {
+            shape(format!("{field}.correction"), matrix, gain)?;
+        }
+    }
+    Ok(())
+}
+
+fn estimator(estimator: &Estimator, sizes: Sizes) -> Checked {
+    let p = sizes.outputs;
+    vector("estimator.thresholds", &estimator.thresholds, p)?;
+    vector("estimator.largest_fault", &estimator.largest_fault, p)?;
+    range(
+        estimator.largest_fault.iter().all(|&fault| fault >= 0.0),
+        "estimator.largest_fault",
+        "must not be negative",
+    )?;
+    range(
+        !estimator.leverage_limit.is_nan(),
+        "estimator.leverage_limit",
+        "must be a number",
+    )?;
+    if estimator.method == EstimatorMethod::Reference {
+        length(
+            "estimator.predictors",
+            estimator.predictors.len(),
+            sizes.modes,
+        )?;
+    }
+    for (index, predictor) in estimator.predictors.iter().enumerate() {
+        let regressors = sizes.inputs.saturating_mul(estimator.response_length);
+        self::predictor(predictor, index, p, regressors)?;
+    }
+    match (estimator.method, &estimator.hypotheses) {
+        (EstimatorMethod::Observer, Some(settings)) => hypotheses(settings, sizes)?,
+        (method, _) => range(
+            method != EstimatorMethod::Observer,
+            "estimator.hypotheses",
+            "must be there for the state-based method",
+        )?,
+    }
+    match &estimator.harmonics {
+        Some(known) => harmonics(known, estimator, sizes),
+        None => Ok(()),
+    }
+}
+
+/// Largest size of anything physical, and largest share or logarithm.
+const LARGEST_SIZE: f64 = 1e50;
+const LARGEST_SHARE: f64 = 1e6;
+
+fn hypotheses(settings: &Hypotheses, sizes: Sizes) -> Checked {
+    let (n, m, p) = (sizes.states, sizes.inputs, sizes.outputs);
+    length(
+        "estimator.hypotheses.channels",
+        settings.channels.len(),
+        sizes.modes,
+    )?;
+    let s = settings.channels.first().map_or(0, |first| first.e.ncols());
+    for channels in &settings.channels {
+        shape(
+            "estimator.hypotheses.channels.e".into(),
+            &channels.e,
+            (n, s),
+        )?;
+        shape(
+            "estimator.hypotheses.channels.f".into(),
+            &channels.f,
+            (p, s),
+        )?;
+    }
+    for (what, values, needed) in [
+        ("fault_size", &settings.fault_size, p),
+        ("authority", &settings.authority, p),
+        ("input_load", &settings.input_load, m),
+        ("disturbance_load", &settings.disturbance_load, s),
+        (
+            "disturbance_size",
+            &settings.disturbance_size,
+            2 * s * settings.angles.len(),
+        ),
+        ("state_load", &settings.state_load, n),
+        ("state_size", &settings.state_size, n),
+        ("start", &settings.start, n),
+        ("start_elsewhere", &settings.start_elsewhere, n),
+    ] {
+        let field = format!("estimator.hypotheses.{what}");
+        length(field.as_str(), values.len(), needed)?;
+        let sensible = values
+            .iter()
+            .all(|value| (0.0..=LARGEST_SIZE).contains(value));
+        range(sensible, field, "must hold numbers from 0 to 1e50")?;
+    }
+    let rates = [
+        settings.fault_rate,
+        settings.stuck_rate,
+        settings.release_rate,
+        settings.change_rate,
+        settings.load_rate,
+        settings.load_moving,
+    ];
+    let sensible = rates.iter().all(|rate| (1e-100..=0.999).contains(rate));
+    range(
+        sensible,
+        "estimator.hypotheses",
+        "must have rates from 1e-100 to 0.999",
+    )?;
+    let shares = [
+        settings.surprise,
+        settings.odds,
+        settings.fault_walk,
+        settings.drift_walk,
+        settings.load_walk,
+        settings.model_error,
+        settings.gain_error,
+        settings.gain_walk,
+        settings.period_error,
+    ];
+    let mut shares = shares.iter().chain(&settings.angles);
+    let sensible = shares.all(|share| (0.0..=LARGEST_SHARE).contains(share));
+    range(
+        sensible,
+        "estimator.hypotheses",
+        "must have shares and angles from 0 to 1e6",
+    )
+}
+
+fn predictor(predictor: &Predictor, index: usize, outputs: usize, regressors: usize) -> Checked {
+    let field = |name: &str| format!("estimator.predictors[{index}].{name}");
+    shape(
+        field("response"),
+        &predictor.response,
+        (outputs, regressors),
+    )?;
+    shape(field("factor"), &predictor.factor, (regressors, regressors))?;
+    vector(&field("deviation"), &predictor.deviation, outputs)
+}
+
+fn harmonics(known: &Harmonics, estimator: &Estimator, sizes: Sizes) -> Checked {
+    range(
+        known.period.is_finite() && known.period > 0.0,
+        "estimator.harmonics.period",
+        "must be a positive number of samples",
+    )?;
+    finite(
+        "estimator.harmonics",
+        &[known.memory, known.initial_variance],
+    )?;
+    let transfers = &estimator.harmonic_transfers;
+    if transfers.is_empty() {
+        return Ok(());
+    }
+    length("estimator.harmonic_transfers", transfers.len(), sizes.modes)?;
+    for (from, row) in transfers.iter().enumerate() {
+        let field = format!("estimator.harmonic_transfers[{from}]");
+        length(field.as_str(), row.len(), sizes.modes)?;
+        for (to, maps) in row.iter().enumerate() {
+            length(format!("{field}[{to}]"), maps.len(), known.count)?;
+            for map in maps {
+                let needed = (sizes.outputs, sizes.outputs);
+                shape(format!("{field}[{to}].real"), &map.real, needed)?;
+                shape(format!("{field}[{to}].imaginary"), &map.imaginary, needed)?;
+            }
+        }
+    }
+    Ok(())
+}

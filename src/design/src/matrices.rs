@@ -1,0 +1,32 @@
+//! Between the matrices that are computed with off line and those that run on line: entry by entry,
+//! nothing is rounded.
+
+use ftc_control::Matrix;
+use ftc_control::parameters::ModeModel;
+use ftc_plant::SwitchedPlant;
+use nalgebra::DMatrix;
+
+/// The matrix as the on-line controller holds it.
+pub fn plain(matrix: &DMatrix<f64>) -> Matrix {
+    Matrix::from_fn(matrix.nrows(), matrix.ncols(), |row, column| {
+        matrix[(row, column)]
+    })
+}
+
+/// The matrix as it is computed with off line.
+pub fn dense(matrix: &Matrix) -> DMatrix<f64> {
+    DMatrix::from_column_slice(matrix.nrows(), matrix.ncols(), matrix.as_slice())
+}
+
+/// The modes of a plant as the on-line controller holds them.
+pub fn mode_models(plant: &SwitchedPlant) -> Vec<ModeModel> {
+    let modes = plant.modes.iter().map(|mode| ModeModel {
+        a: plain(&mode.a),
+        b: plain(&mode.b),
+        c: plain(&mode.c),
+        x0: mode.operating_point.x.clone(),
+        u0: mode.operating_point.u.clone(),
+        y0: mode.operating_point.y.clone(),
+    });
+    modes.collect()
+}
