@@ -74,10 +74,11 @@ browser: build
 	target/release/ftc-fmu --quiet simulate examples/tank.toml --out $(BROWSER)/tank
 	target/release/ftc-fmu --quiet reproduce paper --out $(BROWSER)/reproduce
 	target/release/ftc-fmu --quiet reproduce converter --out $(BROWSER)/reproduce
+	target/release/ftc-fmu --quiet campaign examples/paper.toml --runs 60 --out $(BROWSER)/campaign
 	target/release/ftc-fmu --quiet export examples/paper.toml --out $(BROWSER)
 	for fmu in controller plant; do $(PYTHON) -m zipfile -e $(BROWSER)/*_$$fmu.fmu $(BROWSER)/$$fmu; done
 	$(PYTHON) tests/browser/check_pages.py --screenshots $(BROWSER)/seen $(BROWSER)/simulate/report.html \
-		$(BROWSER)/tank/report.html $(BROWSER)/reproduce/paper.html $(BROWSER)/reproduce/converter.html \
+		$(BROWSER)/campaign/campaign.html $(BROWSER)/tank/report.html $(BROWSER)/reproduce/paper.html $(BROWSER)/reproduce/converter.html \
 		$(BROWSER)/controller/documentation/index.html $(BROWSER)/plant/documentation/index.html
 
 demo: build $(VENV)/ready

@@ -254,20 +254,75 @@ pub fn plant(interface: &Interface) -> VariableTable {
         true,
     )));
 
+    let injected = injected(&mut table, &named("y", &interface.outputs));
+
     let element = |span: Span, at: u32| scalar(span.first + at);
     let mode = [mode_ext, mode_real, scenario];
     let with = |more: &[Span]| [&mode[..], more].concat();
     table.depend(Role::Measurement, |at| {
-        with(&[element(f_ext, at), w_ext, noise])
+        let fault = injected.map(|span| element(span, at));
+        [&with(&[element(f_ext, at), w_ext, noise])[..], &fault].concat()
     });
     table.depend(Role::TrueOutput, |_| with(&[w_ext]));
     table.depend(Role::State, |_| with(&[]));
     table.depend(Role::Reference, |_| vec![scenario]);
     table.depend(Role::Mode, |_| with(&[]));
     table.depend(Role::ModeReal, |_| with(&[]));
-    table.depend(Role::Fault, |at| vec![element(f_ext, at), scenario]);
+    table.depend(Role::Fault, |at| {
+        let fault = injected.map(|span| element(span, at));
+        [&with(&[element(f_ext, at), w_ext, noise])[..], &fault].concat()
+    });
     table.depend(Role::Disturbance, |at| vec![element(w_ext, at), scenario]);
     table
+}
+
+/// An end in seconds that no run reaches.
+const NEVER: f64 = 1e12;
+/// The number of the last kind of injected fault.
+const LAST_KIND: i32 = 6;
+
+/// Tunable parameters that put a fault on each sensor while the plant runs: kind, size, begin, end.
+fn injected(table: &mut VariableTable, outputs: &[SignalInfo]) -> [Span; 4] {
+    let tunable = Maker::parameter(Variability::Tunable);
+    let number = |min: Option<f64>| Kind::Real {
+        unit: None,
+        display_unit: None,
+        relative: false,
+        nominal: None,
+        min,
+        max: None,
+    };
+    let kind = Kind::Integer {
+        min: Some(0),
+        max: Some(LAST_KIND),
+    };
+    let kinds = "0 none, 1 bias, 2 drift, 3 gain, 4 stuck, 5 dropout, 6 noise";
+    let of_size = "its bias, slope per second, lost fraction or standard deviation";
+    [
+        ("kind", Role::InjectedKind, kind, kinds, 0.0),
+        ("size", Role::InjectedSize, number(None), of_size, 0.0),
+        (
+            "from",
+            Role::InjectedFrom,
+            number(Some(0.0)),
+            "its first second",
+            0.0,
+        ),
+        (
+            "until",
+            Role::InjectedUntil,
+            number(Some(0.0)),
+            "the second when it ends",
+            NEVER,
+        ),
+    ]
+    .map(|(name, role, kind, what, start)| {
+        table.extend(outputs.iter().enumerate().map(|(at, output)| {
+            let name = format!("inject_{name}[{}]", at + 1);
+            let description = format!("Fault put on {}: {what}", output.name);
+            tunable.variable(name, description, kind.clone(), role, start)
+        }))
+    })
 }
 
 impl Interface {

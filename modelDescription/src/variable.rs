@@ -120,6 +120,14 @@ pub enum Role {
     ScenarioEnabled,
     /// `noise_enabled`, switches the measurement noise.
     NoiseEnabled,
+    /// `inject_kind`, kinds of the sensor faults set from outside (p).
+    InjectedKind,
+    /// `inject_size`, their sizes (p).
+    InjectedSize,
+    /// `inject_from`, when they begin (p).
+    InjectedFrom,
+    /// `inject_until`, when they end (p).
+    InjectedUntil,
 }
 
 /// One scalar variable; its value reference is its position in the table.

@@ -17,7 +17,7 @@ import elf
 if TYPE_CHECKING:
     from pathlib import Path
 
-RELEASE = commands.PROGRAM.parent
+RELEASE = commands.ROOT / "target" / "release"
 PACKED = sorted((RELEASE / "fmu-binaries").glob("*linux*/ftc_*.so"))
 OLDEST = (2, 17)
 # What the newest glibc holds in one library, an old one keeps in several.

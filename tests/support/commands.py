@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import json
+import os
 import re
 import subprocess
 from dataclasses import dataclass
@@ -12,7 +13,8 @@ from pathlib import Path
 import numpy as np
 
 ROOT = Path(__file__).resolve().parents[2]
-PROGRAM = ROOT / "target" / "release" / "ftc-fmu"
+# The program that was built, or the one that an installed package brings.
+PROGRAM = Path(os.environ.get("FTC_FMU", ROOT / "target" / "release" / "ftc-fmu"))
 WORDS = {"true": 1.0, "false": 0.0}
 
 

@@ -10,7 +10,7 @@ use fmu_abi::{
     Readiness, Refusal, Slave, Values, nearest_mode, require_finite, resource, selected_mode,
 };
 use ftc_simulate::integrate::Stalled;
-use ftc_simulate::plant::{Change, External};
+use ftc_simulate::plant::{Change, External, Injected, LAST_INJECTED_KIND};
 use ftc_simulate::{PlantSimulator, PlantState};
 use model_description::{DESIGN_FILE, Interface, PLANT, Role, Span, VariableTable};
 use std::path::Path;
@@ -42,6 +42,8 @@ struct Spans {
     disturbance: Span,
     scenario_enabled: Span,
     noise_enabled: Span,
+    /// Kind, size, begin and end of injected faults.
+    injected: [Span; 4],
 }
 
 impl Spans {
@@ -62,6 +64,13 @@ impl Spans {
             disturbance: table.span(Role::Disturbance),
             scenario_enabled: table.span(Role::ScenarioEnabled),
             noise_enabled: table.span(Role::NoiseEnabled),
+            injected: [
+                Role::InjectedKind,
+                Role::InjectedSize,
+                Role::InjectedFrom,
+                Role::InjectedUntil,
+            ]
+            .map(|role| table.span(role)),
         }
     }
 }
@@ -84,15 +93,43 @@ impl PlantFmu {
         }
     }
 
+    fn injected<'a>(&self, values: &'a Values) -> Injected<'a> {
+        let [kind, size, from, until] = self.spans.injected.map(|span| values.get(span));
+        Injected {
+            kind,
+            size,
+            from,
+            until,
+        }
+    }
+
+    /// Observes the present tick, faults from outside included.
+    fn observe(&self, state: &mut PlantState, values: &Values) {
+        self.simulator.observe(state, &self.external(values));
+        self.simulator.inject(state, &self.injected(values));
+    }
+
     /// Refuses commands and disturbances that are no finite numbers.
     fn require_numbers(&self, values: &Values) -> Result<(), Refusal> {
         require_finite(&self.table, values, self.spans.command)?;
-        require_finite(&self.table, values, self.spans.external_disturbance)
+        require_finite(&self.table, values, self.spans.external_disturbance)?;
+        for span in self.spans.injected {
+            require_finite(&self.table, values, span)?;
+        }
+        let kinds = values.get(self.spans.injected[0]).iter().enumerate();
+        let last = f64::from(LAST_INJECTED_KIND);
+        for (at, kind) in kinds.filter(|(_, kind)| !(0.0..=last).contains(*kind)) {
+            return Err(Refusal::from(format!(
+                "inject_kind[{}] is {kind}: give a kind from 0 to {last}",
+                at + 1
+            )));
+        }
+        Ok(())
     }
 
     /// Observes the present tick and publishes every output.
     fn publish(&self, state: &mut PlantState, values: &mut Values) {
-        self.simulator.observe(state, &self.external(values));
+        self.observe(state, values);
         let spans = &self.spans;
         values.set(spans.measurement, &state.y);
         values.set(spans.true_output, &state.y_true);
@@ -100,7 +137,7 @@ impl PlantFmu {
         values.set(spans.reference, &state.reference);
         values.set(spans.fault, &state.fault);
         values.set(spans.disturbance, &state.disturbance);
-        let number = [(state.mode + 1) as f64];
+        let number = [(state.told + 1) as f64];
         values.set(spans.mode, &number);
         values.set(spans.mode_real, &number);
     }
@@ -174,7 +211,7 @@ impl Slave for PlantFmu {
         _k: u64,
         _fresh: bool,
     ) -> Result<(), Refusal> {
-        self.simulator.observe(state, &self.external(values));
+        self.observe(state, values);
         let command = values.get(self.spans.command);
         self.simulator.advance(state, command).map_err(|Stalled| {
             Refusal::from(
@@ -219,6 +256,7 @@ impl Slave for PlantFmu {
             self.simulator
                 .differentiate_outputs(trial, &external, &change);
         }
+        self.simulator.inject_change(trial, &self.injected(values));
         response.set(spans.measurement, &trial.y);
         response.set(spans.true_output, &trial.y_true);
         response.set(spans.state, &trial.x);

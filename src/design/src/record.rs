@@ -181,7 +181,9 @@ impl Design {
                 "the schedule names a mode beyond the plant's {modes}"
             ));
         }
-        if let TruePlant::Linear { plant: truth } = &self.true_plant
+        let (motion, deviation) = self.true_plant.clone().into_parts();
+        deviation.check(plant)?;
+        if let TruePlant::Linear { plant: truth } = &motion
             && (Dimensions::check(truth)? != dims || truth.modes.len() != modes)
         {
             return Err("the true plant has other sizes than the designed one".into());

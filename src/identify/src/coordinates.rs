@@ -53,13 +53,14 @@ pub fn shared(data: &Data, models: Vec<Model>) -> (Vec<Placed>, Coordinates) {
 /// The steady state at the mean input, or the nearest there is: `x0`, `u0`, `y0` in own coordinates.
 fn steady(model: &Model) -> (DVector<f64>, DVector<f64>, DVector<f64>) {
     let (n, m) = (model.a.nrows(), model.b.ncols());
+    let constant = model.a0.column(0).into_owned();
     let drift = DMatrix::identity(n, n) - &model.a;
     let (x0, u0) = match drift
         .clone()
         .try_inverse()
         .filter(|inverse| inverse.norm() < WORST_CONDITION)
     {
-        Some(inverse) => (inverse * &model.a0, DVector::zeros(m)),
+        Some(inverse) => (inverse * &constant, DVector::zeros(m)),
         None => {
             // An integrator: the input that keeps it still, as near to the mean as possible.
             let mut both = DMatrix::zeros(n, n + m);
@@ -68,12 +69,12 @@ fn steady(model: &Model) -> (DVector<f64>, DVector<f64>, DVector<f64>) {
             let svd = both.svd(true, true);
             let tolerance = svd.singular_values.max() * 1e-8;
             let found = svd
-                .solve(&model.a0, tolerance)
+                .solve(&constant, tolerance)
                 .unwrap_or_else(|_| DVector::zeros(n + m));
             (found.rows(0, n).into_owned(), found.rows(n, m).into_owned())
         }
     };
-    let y0 = &model.c * &x0 + &model.c0;
+    let y0 = &model.c * &x0 + model.c0.column(0);
     (x0, u0, y0)
 }
 

@@ -10,6 +10,9 @@ pub struct Stretch {
     pub u: DMatrix<f64>,
     /// Outputs (p x samples).
     pub y: DMatrix<f64>,
+    /// What acts besides and is known (q x samples): 1, then sine and cosine of each period of the
+    /// disturbance.
+    pub known: DMatrix<f64>,
 }
 
 impl Stretch {
@@ -18,11 +21,13 @@ impl Stretch {
         self.y.ncols()
     }
 
-    fn part(&self, from: usize, to: usize) -> Self {
+    /// Some of its samples.
+    pub fn part(&self, from: usize, to: usize) -> Self {
         let count = to - from;
         Self {
             u: self.u.columns(from, count).into_owned(),
             y: self.y.columns(from, count).into_owned(),
+            known: self.known.columns(from, count).into_owned(),
         }
     }
 }
@@ -81,9 +86,13 @@ const LEAST_SAMPLES: usize = 40;
 const MANY_STRETCHES: usize = 10;
 
 impl Data {
-    /// Checks, cuts, centres and scales.
-    pub fn prepare(logs: &[Log]) -> Result<Self, Error> {
+    /// Checks, cuts, centres and scales; a disturbance may have known periods (samples).
+    pub fn prepare(logs: &[Log], periods: &[f64]) -> Result<Self, Error> {
         check(logs)?;
+        let sound = |period: &&f64| **period > 2.0 && period.is_finite();
+        if let Some(&period) = periods.iter().find(|period| !sound(period)) {
+            return Err(Error::Period(period));
+        }
         let count = 1 + logs.iter().flat_map(|log| &log.modes).max().unwrap_or(&0);
         let mut raw: Vec<Vec<Stretch>> = vec![Vec::new(); count];
         let mut switches = Vec::new();
@@ -95,6 +104,7 @@ impl Data {
                 raw[mode].push(Stretch {
                     u: log.inputs.rows(first, run.len()).transpose(),
                     y: log.outputs.rows(first, run.len()).transpose(),
+                    known: known(first, run.len(), periods),
                 });
                 let here = (mode, raw[mode].len() - 1);
                 if let Some(from) = before.replace(here) {
@@ -126,6 +136,18 @@ impl Data {
     pub fn outputs(&self) -> usize {
         self.output_scale.len()
     }
+}
+
+/// 1, then sine and cosine of each period, at the rows of a log from `first` on.
+fn known(first: usize, count: usize, periods: &[f64]) -> DMatrix<f64> {
+    DMatrix::from_fn(1 + 2 * periods.len(), count, |row, column| {
+        let Some(wave) = row.checked_sub(1) else {
+            return 1.0;
+        };
+        let at = (first + column) as f64;
+        let (sine, cosine) = (core::f64::consts::TAU * at / periods[wave / 2]).sin_cos();
+        if wave.is_multiple_of(2) { sine } else { cosine }
+    })
 }
 
 fn check(logs: &[Log]) -> Result<(), Error> {

@@ -21,7 +21,7 @@ pub fn percent(model: &Model, stretches: &[Stretch]) -> Vec<f64> {
     let (mut missed, mut moved) = (DVector::<f64>::zeros(p), DVector::<f64>::zeros(p));
     for stretch in usable() {
         let simulated = initial_state(model, stretch, stretch.samples())
-            .map(|start| simulate(model, &start, &stretch.u));
+            .map(|start| simulate(model, &start, stretch));
         for at in 0..stretch.samples() {
             let y = stretch.y.column(at);
             moved += (y - &mean).map(|value| value * value);
@@ -36,12 +36,13 @@ pub fn percent(model: &Model, stretches: &[Stretch]) -> Vec<f64> {
 }
 
 /// Outputs (p x N) of a free run.
-pub fn simulate(model: &Model, start: &DVector<f64>, inputs: &DMatrix<f64>) -> DMatrix<f64> {
+fn simulate(model: &Model, start: &DVector<f64>, stretch: &Stretch) -> DMatrix<f64> {
     let mut state = start.clone();
-    let mut outputs = DMatrix::zeros(model.c.nrows(), inputs.ncols());
-    for (at, input) in inputs.column_iter().enumerate() {
-        outputs.set_column(at, &(&model.c * &state + &model.c0));
-        state = &model.a * state + &model.b * input + &model.a0;
+    let mut outputs = DMatrix::zeros(model.c.nrows(), stretch.samples());
+    for at in 0..stretch.samples() {
+        let known = stretch.known.column(at);
+        outputs.set_column(at, &(&model.c * &state + &model.c0 * known));
+        state = &model.a * state + &model.b * stretch.u.column(at) + &model.a0 * known;
     }
     outputs
 }
@@ -53,8 +54,8 @@ pub fn initial_state(model: &Model, stretch: &Stretch, samples: usize) -> Option
     if samples * p < n {
         return None;
     }
-    let inputs = stretch.u.columns(0, samples).into_owned();
-    let forced = simulate(model, &DVector::zeros(n), &inputs);
+    let stretch = &stretch.part(0, samples);
+    let forced = simulate(model, &DVector::zeros(n), stretch);
     let mut observed = DMatrix::zeros(samples * p, n);
     let mut rest = DVector::zeros(samples * p);
     let mut row = model.c.clone();
@@ -75,9 +76,11 @@ pub fn initial_state(model: &Model, stretch: &Stretch, samples: usize) -> Option
 /// The state after a stretch, told by the predictor.
 pub fn final_state(model: &Model, stretch: &Stretch) -> Option<DVector<f64>> {
     let mut state = initial_state(model, stretch, 4 * model.a.nrows() + 8)?;
-    for (input, output) in stretch.u.column_iter().zip(stretch.y.column_iter()) {
-        let error = output - &model.c * &state - &model.c0;
-        state = &model.a * state + &model.b * input + &model.a0 + &model.k * error;
+    for at in 0..stretch.samples() {
+        let known = stretch.known.column(at);
+        let error = stretch.y.column(at) - &model.c * &state - &model.c0 * known;
+        let driven = &model.b * stretch.u.column(at) + &model.a0 * known;
+        state = &model.a * state + driven + &model.k * error;
     }
     state.iter().all(|value| value.is_finite()).then_some(state)
 }

@@ -56,6 +56,9 @@ pub struct Settings {
     pub order: Option<usize>,
     /// The largest order that is tried.
     pub largest_order: usize,
+    /// Periods, in samples, of a disturbance that is in the logs and that nobody measured (with its
+    /// harmonics): it is told from the plant, and is no part of the model.
+    pub periods: Vec<f64>,
 }
 
 impl Default for Settings {
@@ -63,6 +66,7 @@ impl Default for Settings {
         Self {
             order: None,
             largest_order: 8,
+            periods: Vec::new(),
         }
     }
 }
@@ -151,6 +155,9 @@ pub enum Error {
         /// Samples needed.
         needed: usize,
     },
+    /// A period is none.
+    #[error("a disturbance of period {0} samples cannot be told from others: give one above 2")]
+    Period(f64),
     /// A signal never moves.
     #[error(
         "mode {mode}: {signal} {number} never changes: move every input, with sensors that work"
@@ -181,7 +188,7 @@ const SAME_FIT: f64 = 0.5;
 /// # Errors
 /// [`Error`] where the logs hold too little.
 pub fn identify(logs: &[Log], settings: &Settings) -> Result<Identified, Error> {
-    let data = data::Data::prepare(logs)?;
+    let data = data::Data::prepare(logs, &settings.periods)?;
     let parts: Vec<data::Split> = data.modes.iter().map(data::ModeData::split).collect();
     let tried = try_orders(&data, &parts, settings);
     let best = tried.iter().map(|t| t.fit).fold(f64::MIN, f64::max);

@@ -1,10 +1,12 @@
-//! One mode's model by predictor-based subspace identification (Chiuso 2007), with a constant term.
+//! One mode's model by predictor-based subspace identification (Chiuso 2007), with a constant term
+//! and known periods.
 
 use crate::data::Stretch;
 use crate::least_squares;
-use nalgebra::{DMatrix, DVector};
+use nalgebra::DMatrix;
 
-/// `x(k+1) = A x(k) + B u(k) + K e(k) + a0`, `y(k) = C x(k) + c0 + e(k)`, in scaled deviations.
+/// `x(k+1) = A x(k) + B u(k) + K e(k) + A0 d(k)`, `y(k) = C x(k) + C0 d(k) + e(k)`, in scaled
+/// deviations; `d` is what is known besides, its first entry 1 ([`Stretch::known`]).
 #[derive(Clone, Debug)]
 pub struct Model {
     /// State matrix (n x n).
@@ -15,10 +17,10 @@ pub struct Model {
     pub c: DMatrix<f64>,
     /// Predictor gain (n x p).
     pub k: DMatrix<f64>,
-    /// Constant of the state equation (n).
-    pub a0: DVector<f64>,
-    /// Constant of the output equation (p).
-    pub c0: DVector<f64>,
+    /// What is known, to the state (n x q).
+    pub a0: DMatrix<f64>,
+    /// What is known, to the output (p x q).
+    pub c0: DMatrix<f64>,
 }
 
 impl Model {
@@ -48,7 +50,8 @@ pub fn estimate(stretches: &[Stretch], past: usize, order: usize) -> Option<Mode
     let first = usable.first()?;
     let (m, p) = (first.u.nrows(), first.y.nrows());
     let samples: usize = usable.iter().map(|s| s.samples() - past).sum();
-    let width = past * (m + p) + 1;
+    let q = first.known.nrows();
+    let width = past * (m + p) + q;
     if samples < ROWS_PER_COEFFICIENT * width {
         return None;
     }
@@ -56,7 +59,8 @@ pub fn estimate(stretches: &[Stretch], past: usize, order: usize) -> Option<Mode
     let outputs = concatenate(&usable, p, |s| tail(&s.y, past));
     let markov = least_squares::fit(&outputs, &lagged)?;
     let states = states(&markov, &lagged, past, (m, p), order)?;
-    matrices(&usable, &states, &outputs, past)
+    let known = concatenate(&usable, q, |s| tail(&s.known, past));
+    matrices(&usable, &states, &outputs, &known, past)
 }
 
 /// Columns of all stretches side by side.
@@ -80,13 +84,14 @@ fn tail(values: &DMatrix<f64>, from: usize) -> DMatrix<f64> {
     values.columns(from, values.ncols() - from).into_owned()
 }
 
-/// Column `k - past`: outputs and inputs at `k-1`, ..., `k-past`, and 1.
+/// Column `k - past`: outputs and inputs at `k-1`, ..., `k-past`, and what is known at `k`.
 fn regressors(stretch: &Stretch, past: usize) -> DMatrix<f64> {
     let (m, p) = (stretch.u.nrows(), stretch.y.nrows());
     let block = m + p;
-    DMatrix::from_fn(past * block + 1, stretch.samples() - past, |row, column| {
-        if row == past * block {
-            return 1.0;
+    let rows = past * block + stretch.known.nrows();
+    DMatrix::from_fn(rows, stretch.samples() - past, |row, column| {
+        if row >= past * block {
+            return stretch.known[(row - past * block, column + past)];
         }
         let (lag, part) = (row / block + 1, row % block);
         let at = column + past - lag;
@@ -138,36 +143,37 @@ fn matrices(
     stretches: &[&Stretch],
     states: &DMatrix<f64>,
     outputs: &DMatrix<f64>,
+    known: &DMatrix<f64>,
     past: usize,
 ) -> Option<Model> {
-    let (n, p) = (states.nrows(), outputs.nrows());
-    let with_one = |values: &DMatrix<f64>| values.clone().insert_row(values.nrows(), 1.0);
-    let read = least_squares::fit(outputs, &with_one(states))?;
-    let (c, c0) = (read.columns(0, n).into_owned(), read.column(n).into_owned());
-    let mut errors = outputs - &c * states;
-    for mut column in errors.column_iter_mut() {
-        column -= &c0;
-    }
+    let (n, p, q) = (states.nrows(), outputs.nrows(), known.nrows());
+    let mut reading = DMatrix::zeros(n + q, states.ncols());
+    reading.rows_mut(0, n).copy_from(states);
+    reading.rows_mut(n, q).copy_from(known);
+    let read = least_squares::fit(outputs, &reading)?;
+    let errors = outputs - &read * reading;
     // Pairs of states that follow each other within a stretch.
     let m = stretches[0].u.nrows();
     let pairs: usize = stretches.iter().map(|s| s.samples() - past - 1).sum();
     let mut next = DMatrix::zeros(n, pairs);
-    let mut now = DMatrix::from_element(n + m + p + 1, pairs, 1.0);
+    let mut now = DMatrix::zeros(n + m + p + q, pairs);
     let (mut first, mut pair) = (0, 0);
     for stretch in stretches {
         let count = stretch.samples() - past;
         next.columns_mut(pair, count - 1)
             .copy_from(&states.columns(first + 1, count - 1));
         let mut columns = now.columns_mut(pair, count - 1);
-        columns
-            .rows_mut(0, n)
-            .copy_from(&states.columns(first, count - 1));
-        columns
-            .rows_mut(n, m)
-            .copy_from(&stretch.u.columns(past, count - 1));
-        columns
-            .rows_mut(n + m, p)
-            .copy_from(&errors.columns(first, count - 1));
+        let parts = [
+            states.columns(first, count - 1),
+            stretch.u.columns(past, count - 1),
+            errors.columns(first, count - 1),
+            known.columns(first, count - 1),
+        ];
+        let mut row = 0;
+        for part in parts {
+            columns.rows_mut(row, part.nrows()).copy_from(&part);
+            row += part.nrows();
+        }
         first += count;
         pair += count - 1;
     }
@@ -176,8 +182,8 @@ fn matrices(
         a: found.columns(0, n).into_owned(),
         b: found.columns(n, m).into_owned(),
         k: found.columns(n + m, p).into_owned(),
-        a0: found.column(n + m + p).into_owned(),
-        c,
-        c0,
+        a0: found.columns(n + m + p, q).into_owned(),
+        c: read.columns(0, n).into_owned(),
+        c0: read.columns(n, q).into_owned(),
     })
 }

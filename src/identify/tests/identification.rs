@@ -230,6 +230,50 @@ fn an_order_that_is_asked_for_is_kept() {
     assert_eq!(found.coordinates, Coordinates::Single);
 }
 
+/// A disturbance that nobody measured, of known period: the plant is found, its oscillation is not.
+#[test]
+fn a_periodic_disturbance_is_told_from_the_plant() {
+    const PERIOD: f64 = 120.0;
+    let mut random = ChaCha8Rng::seed_from_u64(6);
+    let plant = Plant::random(&mut random, 2, 2, 2, 1);
+    let mut log = plant.log(&mut random, vec![0; 700], 0.01);
+    // It acts on the state, so that what it does to the outputs is another sine.
+    let (a, _, c) = &plant.modes[0];
+    let mut x = DVector::zeros(2);
+    for k in 0..700 {
+        let mut row = log.outputs.row_mut(k);
+        row += (c * &x).transpose();
+        let w = 2.0 * (std::f64::consts::TAU * k as f64 / PERIOD).sin();
+        x = a * x + DVector::from_element(2, w);
+    }
+    let settings = Settings {
+        periods: vec![PERIOD],
+        ..Settings::default()
+    };
+    let found = identify(&[log.clone()], &settings).unwrap();
+    assert_eq!(found.order, 2, "{:?}", found.tried);
+    let error = response_error(&plant, &found);
+    assert!(error < 0.05, "responses off by {error:e}");
+    let (mode, point) = (&found.modes[0], &plant.points[0]);
+    assert_eq!((mode.b.ncols(), mode.u0.len()), (2, 2));
+    // The operating point is that without the disturbance.
+    let gain = c * (DMatrix::identity(2, 2) - a).try_inverse().unwrap() * &plant.modes[0].1;
+    let expected = &point.2 + gain * (&mode.u0 - &point.1);
+    assert!(
+        (&mode.y0 - expected).amax() < 0.2,
+        "{} {}",
+        mode.y0,
+        point.2
+    );
+    let blind = identify(&[log.clone()], &Settings::default()).unwrap();
+    assert!(blind.order > 2, "{:?}", blind.tried);
+    let wrong = Settings {
+        periods: vec![1.5],
+        ..Settings::default()
+    };
+    assert_eq!(identify(&[log], &wrong).unwrap_err(), Error::Period(1.5));
+}
+
 #[test]
 fn an_integrator_is_found() {
     let mut random = ChaCha8Rng::seed_from_u64(5);

@@ -10,6 +10,8 @@
 //! where `(x0, u0, y0)` is the mode's operating point (zero when absent), `w` the periodic
 //! disturbance and `f` the additive sensor fault. Everything is in the user's physical units.
 
+mod continuous;
+pub mod deviation;
 mod dimensions;
 pub mod noise;
 pub mod rectifier;
@@ -18,6 +20,7 @@ pub mod scaling;
 pub mod scenario;
 mod true_plant;
 
+pub use deviation::Deviation;
 pub use dimensions::Dimensions;
 pub use scenario::Scenario;
 pub use true_plant::TruePlant;

@@ -1,7 +1,7 @@
 //! What the simulated plant really is, as opposed to what the controller was designed for.
 
-use crate::SwitchedPlant;
 use crate::rectifier::Rectifier;
+use crate::{Deviation, SwitchedPlant};
 use serde::{Deserialize, Serialize};
 
 /// The plant behind the sensors.
@@ -18,6 +18,13 @@ pub enum TruePlant {
     },
     /// The nonlinear averaged rectifier.
     Rectifier(Rectifier),
+    /// One of these, with other departures.
+    Deviating {
+        /// Its motion.
+        plant: Box<TruePlant>,
+        /// The rest.
+        deviation: Deviation,
+    },
 }
 
 impl TruePlant {
@@ -26,6 +33,27 @@ impl TruePlant {
         match self {
             Self::Linear { plant } => plant,
             Self::AsDesigned | Self::Rectifier(_) => designed,
+            Self::Deviating { plant, .. } => plant.linear(designed),
+        }
+    }
+
+    /// Its motion, and what else departs from the model.
+    pub fn into_parts(self) -> (Self, Deviation) {
+        match self {
+            Self::Deviating { plant, deviation } => (*plant, deviation),
+            motion => (motion, Deviation::default()),
+        }
+    }
+
+    /// The motion of this plant with these departures.
+    pub fn with_deviation(self, deviation: Deviation) -> Self {
+        let (motion, _) = self.into_parts();
+        if deviation == Deviation::default() {
+            return motion;
+        }
+        Self::Deviating {
+            plant: Box::new(motion),
+            deviation,
         }
     }
 }

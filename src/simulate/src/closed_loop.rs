@@ -133,7 +133,7 @@ impl Regulator for Tolerant<'_> {
         };
         let sample = self
             .controller
-            .sample(seen.tick, seen.mode, &seen.y, &seen.reference)
+            .sample(seen.tick, seen.told, &seen.y, &seen.reference)
             .and_then(|sample| sample.compensating(compensate))
             .expect("plant and controller have the same sizes");
         self.controller.tick(&mut self.state, &sample);
@@ -171,6 +171,40 @@ pub fn run(plant: &PlantSimulator, controller: &Controller, variant: Variant) ->
     )
 }
 
+/// One sample of a running loop.
+#[derive(Clone, Copy, Debug)]
+pub struct Seen<'a> {
+    /// The plant, observed at this tick.
+    pub plant: &'a PlantState,
+    /// The command computed at this tick (m).
+    pub command: &'a [f64],
+    /// The regulator's inner signals.
+    pub report: Report<'a>,
+}
+
+/// As [`run`], but shows each sample to `visit` and keeps none. Returns the first tick, if any, that
+/// the plant's equations could not be integrated through.
+pub fn visit(
+    plant: &PlantSimulator,
+    controller: &Controller,
+    variant: Variant,
+    mut visit: impl FnMut(&Seen<'_>),
+) -> Option<u64> {
+    let mut regulator = Tolerant {
+        controller,
+        state: controller.initial_state(plant.initial_state().mode),
+        variant,
+    };
+    let delayed = controller.parameters().feedback.latency > 0;
+    drive(plant, &mut regulator, delayed, |state, regulator| {
+        visit(&Seen {
+            plant: state,
+            command: regulator.command(),
+            report: regulator.report(),
+        });
+    })
+}
+
 /// Runs the scenario once with any regulator; `delayed` commands act one tick later.
 pub fn run_with(
     plant: &PlantSimulator,
@@ -178,6 +212,24 @@ pub fn run_with(
     variant: Variant,
     delayed: bool,
 ) -> Trajectory {
+    let mut records = Vec::with_capacity(plant.scenario().steps as usize);
+    let stalled = drive(plant, regulator, delayed, |state, regulator| {
+        records.push(record(state, regulator));
+    });
+    Trajectory {
+        variant,
+        records,
+        stalled,
+    }
+}
+
+/// Closes the loop for the length of the scenario, and shows each sample after the regulator's tick.
+fn drive(
+    plant: &PlantSimulator,
+    regulator: &mut dyn Regulator,
+    delayed: bool,
+    mut show: impl FnMut(&PlantState, &dyn Regulator),
+) -> Option<u64> {
     let mut state = plant.initial_state();
     let mut acting = regulator.command().to_vec();
     let silent_fault = vec![0.0; state.y.len()];
@@ -188,12 +240,11 @@ pub fn run_with(
         mode: None,
         noise: true,
     };
-    let mut records = Vec::with_capacity(plant.scenario().steps as usize);
     let mut stalled = None;
     for _ in 0..plant.scenario().steps {
         plant.observe(&mut state, &external);
         regulator.tick(&state);
-        records.push(record(&state, regulator));
+        show(&state, regulator);
         if !delayed {
             acting.copy_from_slice(regulator.command());
         }
@@ -204,11 +255,7 @@ pub fn run_with(
         }
         acting.copy_from_slice(regulator.command());
     }
-    Trajectory {
-        variant,
-        records,
-        stalled,
-    }
+    stalled
 }
 
 fn record(plant: &PlantState, regulator: &dyn Regulator) -> Record {

@@ -1,18 +1,22 @@
 //! The plant under a scenario, sample by sample: what the plant FMU runs.
 
+mod departure;
 mod derivative;
+mod injection;
 mod rectifier;
 
 pub use derivative::Change;
+pub use injection::{Injected, LAST_INJECTED_KIND};
 
 use super::integrate::Stalled;
+use departure::Departed;
 use ftc_control::state::State;
 use ftc_control::{Matrix, kernel};
 use ftc_design::plain;
 use ftc_plant::TruePlant;
 use ftc_plant::noise;
 use ftc_plant::scenario::{FaultEvent, Scenario};
-use ftc_plant::{Mode, SwitchedPlant};
+use ftc_plant::{Deviation, Mode, SwitchedPlant};
 use serde::{Deserialize, Serialize};
 
 /// A plant and its scenario: immutable, shared by any number of [`PlantState`]s.
@@ -20,6 +24,7 @@ use serde::{Deserialize, Serialize};
 pub struct PlantSimulator {
     plant: SwitchedPlant,
     true_plant: TruePlant,
+    deviation: Deviation,
     scenario: Scenario,
     modes: Vec<Dynamics>,
 }
@@ -77,6 +82,8 @@ pub struct PlantState {
     pub tick: u64,
     /// Active mode (0-based).
     pub mode: usize,
+    /// The mode (0-based) that is told to whoever controls the plant.
+    pub told: usize,
     /// State `x` (n).
     pub x: Vec<f64>,
     /// Measured output `y` (p).
@@ -95,6 +102,8 @@ pub struct PlantState {
     last: Vec<f64>,
     /// Scratch (n).
     next: Vec<f64>,
+    /// What the true plant's departures carry.
+    departed: Departed,
 }
 
 ftc_control::state!(PlantState {
@@ -107,10 +116,11 @@ ftc_control::state!(PlantState {
         reference,
         noise,
         last,
-        next
+        next,
+        departed
     ],
     constants: [],
-    counters: [tick, mode]
+    counters: [tick, mode, told]
 });
 
 impl PlantSimulator {
@@ -126,10 +136,12 @@ impl PlantSimulator {
         scenario: Scenario,
     ) -> Self {
         let plant = true_plant.linear(&designed).clone();
+        let (true_plant, deviation) = true_plant.into_parts();
         Self {
             modes: plant.modes.iter().map(Dynamics::new).collect(),
             plant,
             true_plant,
+            deviation,
             scenario,
         }
     }
@@ -164,6 +176,7 @@ impl PlantSimulator {
         PlantState {
             tick: 0,
             mode,
+            told: mode,
             x: point.x.clone(),
             y: vec![0.0; dims.outputs],
             y_true: vec![0.0; dims.outputs],
@@ -173,6 +186,7 @@ impl PlantSimulator {
             noise: vec![0.0; dims.outputs],
             last: point.y.clone(),
             next: vec![0.0; dims.states],
+            departed: Departed::new(point, &self.deviation),
         }
     }
 
@@ -188,6 +202,8 @@ impl PlantSimulator {
         let scenario = &self.scenario;
         let built_in = external.mode.is_none();
         state.mode = self.active_mode(external, tick);
+        state.told = self.told_mode(external, state.mode, tick);
+        state.departed.plays = built_in;
         let Some(mode) = self.modes.get(state.mode) else {
             return;
         };
@@ -205,6 +221,7 @@ impl PlantSimulator {
         {
             *out = kernel::bounded(value(signal) + added);
         }
+        self.load_disturbance(state);
         for ((out, signal), &added) in state
             .fault
             .iter_mut()
@@ -234,6 +251,9 @@ impl PlantSimulator {
     /// [`Stalled`] where the nonlinear plant cannot be integrated; the tick then ends where that
     /// became so, and later ticks go on from there.
     pub fn advance(&self, state: &mut PlantState, u: &[f64]) -> Result<(), Stalled> {
+        self.actuate(state, u);
+        let applied = core::mem::take(&mut state.departed.applied);
+        let u = applied.as_slice();
         let result = match &self.true_plant {
             TruePlant::Rectifier(rectifier) => rectifier::advance_rectifier(
                 rectifier,
@@ -243,11 +263,14 @@ impl PlantSimulator {
                 &state.disturbance,
                 self.plant.sample_time,
             ),
-            TruePlant::AsDesigned | TruePlant::Linear { .. } => {
+            TruePlant::AsDesigned | TruePlant::Linear { .. } | TruePlant::Deviating { .. } => {
                 self.advance_linear(state, u);
                 Ok(())
             }
         };
+        state.departed.applied = applied;
+        self.load_state(state);
+        state.departed.read(&state.y_true);
         kernel::bound(&mut state.x);
         state.tick = state.tick.saturating_add(1);
         result
@@ -280,7 +303,7 @@ impl PlantSimulator {
     /// `y = y_true + f + noise`, unless an event replaces the reading.
     fn read_sensors(&self, state: &mut PlantState, events: bool) {
         let (tick, te) = (state.tick, self.plant.sample_time);
-        let clean = state.y_true.iter().zip(&state.noise);
+        let clean = state.departed.seen(&state.y_true).iter().zip(&state.noise);
         let read = state
             .y
             .iter_mut()
@@ -369,7 +392,7 @@ mod tests {
         ) {
             let simulator = simulator();
             let [x, y, y_true, fault, disturbance, reference, noise, last, next] = sizes.map(|size| vec![1.0; size]);
-            let mut state = PlantState { tick: 3, mode, x, y, y_true, fault, disturbance, reference, noise, last, next };
+            let mut state = PlantState { tick: 3, mode, x, y, y_true, fault, disturbance, reference, noise, last, next, told: mode, departed: Departed::default() };
             let (u, f, w) = (vec![1.0; m], vec![1.0; p], vec![1.0; s]);
             let external = External { fault: &f, disturbance: &w, mode: given, noise: true };
             simulator.advance(&mut state, &u).unwrap();

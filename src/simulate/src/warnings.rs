@@ -202,7 +202,7 @@ fn stopped(design: &Design, run: &Trajectory) -> Option<RunWarning> {
 
 /// A rectifier that left the region in which it is the plant of the design.
 fn diodes_conduct(design: &Design, run: &Trajectory) -> Option<RunWarning> {
-    let TruePlant::Rectifier(rectifier) = &design.true_plant else {
+    let (TruePlant::Rectifier(rectifier), _) = design.true_plant.clone().into_parts() else {
         return None;
     };
     let voltage = rectifier.diode_voltage();

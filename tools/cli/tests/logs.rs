@@ -1,6 +1,7 @@
 //! Databases of healthy operation from CSV files: what is read, and what is refused in one sentence.
 //!
 //! promise: sound-logs
+//! promise: any-dialect
 #![allow(missing_docs)]
 
 mod common;
@@ -140,6 +141,163 @@ fn the_examples_logs_are_what_its_script_writes() {
     }
 }
 
+/// The dialects in which spreadsheets, loggers and simulation tools write the same log.
+#[test]
+fn a_log_is_read_in_every_dialect() {
+    let (one, two) = (log(&rows(0, 200, 0)), log(&rows(1, 200, 0)));
+    let point_to_comma = |text: &str| text.replace(',', ";").replace('.', ",");
+    let stamped = |text: &str, stamp: &dyn Fn(usize) -> String| -> String {
+        let mut lines = text.lines();
+        let header = lines.next().unwrap().replacen("t,", "Timestamp,", 1);
+        let rest = lines.enumerate().map(|(k, line)| {
+            let (_, cells) = line.split_once(',').unwrap();
+            format!("\n{},{cells}", stamp(k))
+        });
+        header + &rest.collect::<String>() + "\n"
+    };
+    let scaled = |text: &str, name: &str| {
+        stamped(text, &|k| (1000 * k).to_string()).replacen("Timestamp", name, 1)
+    };
+    let utf16 = |text: &str| -> Vec<u8> {
+        let units = std::iter::once(0xfeff).chain(text.encode_utf16());
+        units.flat_map(u16::to_le_bytes).collect()
+    };
+    let quoted = |text: &str| -> String {
+        text.lines()
+            .map(|line| format!("\"{}\"\r\n", line.replace(',', "\",\"")))
+            .collect()
+    };
+    let clock = |k: usize| format!("2026-03-28T23:{:02}:{:02}", 55 + k / 60, k % 60);
+    let dialects: Vec<(&str, Vec<u8>)> = vec![
+        (
+            "semicolons and decimal commas",
+            point_to_comma(&one).into_bytes(),
+        ),
+        ("tabs", one.replace(',', "\t").into_bytes()),
+        (
+            "tabs and decimal commas",
+            point_to_comma(&one).replace(';', "\t").into_bytes(),
+        ),
+        ("a byte order mark", format!("\u{feff}{one}").into_bytes()),
+        ("UTF-16", utf16(&one.replace(',', "\t"))),
+        ("carriage returns", one.replace('\n', "\r\n").into_bytes()),
+        ("quotes", quoted(&one).into_bytes()),
+        ("a sep line", format!("sep=,\r\n{one}").into_bytes()),
+        (
+            "a sep line with a semicolon",
+            format!("\u{feff}sep=;\n{}", point_to_comma(&one)).into_bytes(),
+        ),
+        (
+            "empty rows at the end",
+            format!("{one},,,,\n,,,,\n\n,\n").into_bytes(),
+        ),
+        (
+            "a delimiter at the end of each row",
+            one.replace('\n', ",\n").into_bytes(),
+        ),
+        ("another case", one.replacen("t,", "TIME,", 1).into_bytes()),
+        ("milliseconds", scaled(&one, "Time (ms)").into_bytes()),
+        ("time stamps", stamped(&one, &clock).into_bytes()),
+        (
+            "time stamps with a zone",
+            stamped(&one, &|k| clock(k) + ".000+01:00").into_bytes(),
+        ),
+        (
+            "time stamps with a space",
+            stamped(&one, &|k| clock(k).replace('T', " ")).into_bytes(),
+        ),
+    ];
+    let report = |first: &[u8]| {
+        let bench = bench(PAIR, &[("two.csv", &two)]);
+        fs::write(bench.path("one.csv"), first).unwrap();
+        let run = bench.run(&["design", FILE, "--json"]);
+        (run.code(), run.stdout(), run.stderr())
+    };
+    let expected = report(one.as_bytes());
+    assert_eq!(expected.0, 0, "{}", expected.2);
+    for (dialect, bytes) in dialects {
+        let found = report(&bytes);
+        assert_eq!(found.0, 0, "{dialect}: {}", found.2);
+        assert_eq!(found.1, expected.1, "{dialect}");
+    }
+}
+
+/// Rounded times are no gaps, and a time column may be named.
+#[test]
+fn rounded_times_and_named_columns_are_read() {
+    let (one, two) = (rows(0, 200, 0), log(&rows(1, 200, 0)));
+    let jittering: Vec<[f64; 5]> = one
+        .iter()
+        .enumerate()
+        .map(|(k, row)| {
+            [
+                row[0] + [0.0, 0.02, -0.02][k % 3],
+                row[1],
+                row[2],
+                row[3],
+                row[4],
+            ]
+        })
+        .collect();
+    let named = log(&one).replacen("t,", "elapsed,", 1);
+    let run =
+        bench(PAIR, &[("one.csv", &log(&jittering)), ("two.csv", &two)]).run(&["design", FILE]);
+    assert_eq!(run.code(), 0, "{}", run.stderr());
+    let run = bench(PAIR, &[("one.csv", &named), ("two.csv", &two)]).run(&["design", FILE]);
+    assert_eq!(run.code(), 0, "{}", run.stderr());
+    assert!(
+        run.stdout()
+            .contains("one.csv: no column is called t or time"),
+        "{}",
+        run.stdout()
+    );
+    assert!(
+        !run.stdout().contains("two.csv: no column"),
+        "{}",
+        run.stdout()
+    );
+    let both = [("one.csv", named.as_str()), ("two.csv", &named)];
+    let gap = named.replacen("\n60,", "\n61,", 1);
+    for (first, code) in [(named.as_str(), 0), (gap.as_str(), 2)] {
+        let database = format!("{PAIR}\ntime = \"elapsed\"");
+        let bench = bench(&database, &[("one.csv", first), both[1]]);
+        let run = bench.run(&["design", FILE]);
+        assert_eq!(run.code(), code, "{}", run.stderr());
+    }
+    let run = bench(&format!("{PAIR}\ntime = \"clock\""), &both).run(&["design", FILE]);
+    assert!(
+        run.stderr().contains("'clock'") && run.stderr().contains("elapsed"),
+        "{}",
+        run.stderr()
+    );
+}
+
+/// What is no regular file is not opened: a pipe would be waited for.
+#[test]
+#[cfg(unix)]
+fn only_regular_files_are_read() {
+    let bench = bench(PAIR, &[("two.csv", "t\n")]);
+    for name in ["one.csv", "pipe.toml"] {
+        let made = std::process::Command::new("mkfifo")
+            .arg(bench.path(name))
+            .status();
+        assert!(made.unwrap().success());
+    }
+    for (file, word) in [
+        (FILE, "one.csv"),
+        ("pipe.toml", "pipe.toml"),
+        ("/dev/zero", "/dev/zero"),
+    ] {
+        let run = bench.run(&["design", file]);
+        assert_eq!(run.code(), 2, "{}", run.stdout());
+        let message = run.stderr();
+        assert!(
+            message.contains(word) && message.contains("no regular file"),
+            "{message}"
+        );
+    }
+}
+
 /// One damaged log: what is wrong, the first file, and words the sentence must have.
 type Case = (&'static str, String, &'static [&'static str]);
 
@@ -172,6 +330,11 @@ fn damaged_logs_are_refused_in_one_sentence() {
         .collect();
     let cases: Vec<Case> = vec![
         ("empty file", String::new(), &["no column"]),
+        (
+            "a time that lost a row",
+            without(50).replacen("t,", "Time [s],", 1),
+            &["row 50 (line 51)", "Time [s] goes from 48 to 50"],
+        ),
         ("header only", "t,u[1],u[2],a,b\n".into(), &["has no rows"]),
         (
             "missing output",
@@ -194,9 +357,66 @@ fn damaged_logs_are_refused_in_one_sentence() {
             &["two columns a"],
         ),
         (
-            "semicolons",
-            text.replace(',', ";"),
-            &["separate columns by commas"],
+            "a decimal comma between commas",
+            text.replacen("t,u[1],u[2],a,b\n0,", "t,u[1],u[2],a,b\n\"0,0\",", 1),
+            &["row 1 (line 2)", "column t", "'0,0'"],
+        ),
+        (
+            "a doubled row",
+            text.replacen(&line(9), &format!("{}\n{}", line(9), line(9)), 1),
+            &["row 10 (line 11)", "from 8 to 8"],
+        ),
+        (
+            "a hole of empty cells",
+            with(20, ",,,,"),
+            &["line 21 is empty", "line 22"],
+        ),
+        (
+            "a clock five percent off",
+            {
+                let mut rows = good.clone();
+                for row in &mut rows {
+                    row[0] *= 1.048;
+                }
+                log(&rows)
+            },
+            &["row 4 (line 5)", "sample_time 1", "1.048000 s apart"],
+        ),
+        (
+            "a clock that is off in the first half only",
+            {
+                let mut rows = good.clone();
+                for row in &mut rows {
+                    row[0] += 0.03 * row[0].min(100.0) - 0.03 * (row[0] - 100.0).max(0.0);
+                }
+                log(&rows)
+            },
+            &["sample_time 1", "apart"],
+        ),
+        (
+            "thousands",
+            cell(30, 2, "1,234.5").replace("1,234.5", "\"1,234.5\""),
+            &["row 30", "column u[2]", "'1,234.5'"],
+        ),
+        (
+            "a workbook",
+            format!("PK\u{3}\u{4}{text}"),
+            &["an Excel workbook", "save the table as CSV"],
+        ),
+        (
+            "two times",
+            text.replacen("t,u[1],u[2],a,b", "t,u[1],u[2],a,b,Time [s]", 1)
+                .lines()
+                .enumerate()
+                .map(|(at, row)| {
+                    if at == 0 {
+                        format!("{row}\n")
+                    } else {
+                        format!("{row},0\n")
+                    }
+                })
+                .collect(),
+            &["two columns that may be the time", "Time [s]", "time ="],
         ),
         (
             "NaN",

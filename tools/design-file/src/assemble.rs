@@ -5,41 +5,45 @@
 use crate::check;
 use crate::defaults;
 use crate::healthy_log::Logs;
+use crate::notes::Notes;
+use crate::plant;
 use crate::schema::{
     self, CompensationMethod, DesignFile, EstimatorMethod, LyapunovKind, ObjectiveKind,
-    ObserverKind, PlantModel, SignalInfo,
+    ObserverKind, SignalInfo,
 };
-use crate::signal::Signal as SignalOverTime;
+use crate::signal::{Signal as SignalOverTime, Tables};
+use crate::true_plant;
 use crate::values::{NameOrList, NumberOrList};
 use ftc_control::parameters;
 use ftc_design::assembly::{DatabaseSource, EstimatorSpec, KnownDisturbance, Request, Threshold};
 use ftc_design::{ControlSpec, HypothesesSpec, Lyapunov, Objective, ObserverSpec, Signal, Signals};
-use ftc_plant::rows;
 use ftc_plant::scenario::{ModeInterval, Waveform};
-use ftc_plant::{Dimensions, Mode, OperatingPoint, SwitchedPlant};
-use ftc_plant::{Scenario, TruePlant};
-use nalgebra::DMatrix;
+use ftc_plant::{Dimensions, OperatingPoint, Scenario, SwitchedPlant};
 use std::path::Path;
 
 /// The largest number of states, inputs, outputs, disturbances or modes.
-const LARGEST_SIZE: usize = 64;
+pub(crate) const LARGEST_SIZE: usize = 64;
 /// The most samples of a scenario.
 const MOST_STEPS: usize = 1_000_000;
 /// The longest debounce in samples, and the most repetitions of a reading.
 const LONGEST_DEBOUNCE: usize = 10_000;
+/// How the names of logs end.
+const LOG_ENDINGS: [&str; 4] = [".csv", ".tsv", ".txt", ".dat"];
 /// The most harmonics of a disturbance.
 const MOST_HARMONICS: usize = 50;
 
-/// Checks a design file and turns it into a request; CSV tables are sought in `folder`.
+/// Checks a design file and turns it into a request; other files are sought in `folder`, and `notes`
+/// gets what the user should know of them.
 ///
 /// # Errors
 /// One sentence that names the key and what to do.
-pub fn request(file: &DesignFile, folder: &Path) -> Result<Request, String> {
+pub(crate) fn request(file: &DesignFile, folder: &Path, notes: &Notes) -> Result<Request, String> {
     at("name", check::identifier(&file.name))?;
-    let plant = plant(file)?;
-    let dims = Dimensions::check(&plant)?;
-    check_sizes(&plant, dims)?;
-    let signals = signals(&file.signals, &plant, dims)?;
+    let given = plant::read(file, folder, notes)?;
+    let signals = signals(&file.signals, &given)?;
+    let true_plant = true_plant::true_plant(file, &given, folder)?;
+    let plant = given.plant;
+    let dims = plant.dimensions();
     let disturbance = disturbance(file, dims)?;
     let control = ControlSpec {
         resonators: resonators(file, disturbance.as_ref())?,
@@ -50,6 +54,8 @@ pub fn request(file: &DesignFile, folder: &Path) -> Result<Request, String> {
         plant: &plant,
         signals: &signals,
         folder,
+        time: file.estimator.time.as_deref(),
+        notes,
     };
     let estimator = estimator(&file.estimator, disturbance, dims, &logs)?;
     let scenario = ScenarioContext {
@@ -59,14 +65,19 @@ pub fn request(file: &DesignFile, folder: &Path) -> Result<Request, String> {
         signals: &signals,
         plant: &plant,
         dims,
-        folder,
+        tables: Tables {
+            folder,
+            sample_time: plant.sample_time,
+            most_samples: MOST_STEPS,
+            notes,
+        },
     }
     .resolve()?;
     Ok(Request {
         name: file.name.clone(),
         signals,
         plant,
-        true_plant: true_plant(file),
+        true_plant,
         control,
         bumpless: file.controller.bumpless.unwrap_or(defaults::BUMPLESS),
         feedforward: file.controller.feedforward.unwrap_or(defaults::FEEDFORWARD),
@@ -78,164 +89,13 @@ pub fn request(file: &DesignFile, folder: &Path) -> Result<Request, String> {
 }
 
 /// Puts the key before a complaint.
-fn at<T>(key: &str, result: Result<T, String>) -> Result<T, String> {
+pub(crate) fn at<T>(key: &str, result: Result<T, String>) -> Result<T, String> {
     result.map_err(|what| format!("{key} {what}"))
 }
 
-/// What is simulated: the modes themselves, or the named model they are linearised from.
-fn true_plant(file: &DesignFile) -> TruePlant {
-    match &file.plant {
-        None => TruePlant::AsDesigned,
-        Some(PlantModel::Rectifier(rectifier)) => TruePlant::Rectifier(rectifier.clone()),
-    }
-}
-
-/// The modes of a named model: its linearisations.
-fn linearised(model: &PlantModel, sample_time: f64) -> Result<SwitchedPlant, String> {
-    let PlantModel::Rectifier(rectifier) = model;
-    let values = [
-        ("inductance", rectifier.inductance),
-        ("resistance", rectifier.resistance),
-        ("capacitance", rectifier.capacitance),
-        ("phase_voltage", rectifier.phase_voltage),
-        ("current_loop", rectifier.current_loop),
-        ("dc_voltage", rectifier.dc_voltage),
-    ];
-    for (key, value) in values {
-        at(&format!("plant.{key}"), check::positive(value))?;
-    }
-    at(
-        "plant.loads",
-        check::each(&rectifier.loads, check::positive),
-    )?;
-    if rectifier.loads.is_empty() || rectifier.loads.len() > LARGEST_SIZE {
-        return Err(format!(
-            "plant.loads has {} entries: give 1 to {LARGEST_SIZE}, one per mode",
-            rectifier.loads.len()
-        ));
-    }
-    at("plant:", rectifier.linearise(sample_time))
-}
-
-fn plant(file: &DesignFile) -> Result<SwitchedPlant, String> {
-    at("sample_time", check::positive(file.sample_time))?;
-    match (&file.plant, file.modes.is_empty()) {
-        (Some(model), true) => return linearised(model, file.sample_time),
-        (Some(_), false) => {
-            return Err(
-                "[plant] and [[mode]] exclude each other: a named model brings its own modes"
-                    .into(),
-            );
-        }
-        (None, true) => {
-            return Err(
-                "mode is missing: add at least one [[mode]], or a [plant] with a model".into(),
-            );
-        }
-        (None, false) => {}
-    }
-    if file.modes.len() > LARGEST_SIZE {
-        return Err(format!(
-            "mode: there are {} modes: give at most {LARGEST_SIZE}",
-            file.modes.len()
-        ));
-    }
-    let width = |rows: &Option<Vec<Vec<f64>>>| rows.as_ref()?.first().map(Vec::len);
-    let disturbances = file
-        .modes
-        .iter()
-        .find_map(|mode| width(&mode.e).or(width(&mode.f)))
-        .unwrap_or(0);
-    let modes: Result<Vec<Mode>, String> = file
-        .modes
-        .iter()
-        .enumerate()
-        .map(|(index, given)| {
-            mode(given, index + 1, disturbances)
-                .map_err(|what| format!("mode {}: {what}", index + 1))
-        })
-        .collect();
-    Ok(SwitchedPlant {
-        sample_time: file.sample_time,
-        modes: modes?,
-    })
-}
-
-fn mode(given: &schema::Mode, number: usize, disturbances: usize) -> Result<Mode, String> {
-    let a = matrix("A", &given.a)?;
-    let b = matrix("B", &given.b)?;
-    let c = matrix("C", &given.c)?;
-    let (n, p) = (a.nrows(), c.nrows());
-    let channel = |name: &str, rows: &Option<Vec<Vec<f64>>>, height: usize| match rows {
-        Some(rows) => matrix(name, rows),
-        None => Ok(DMatrix::zeros(height, disturbances)),
-    };
-    let operating_point = match &given.operating_point {
-        Some(point) => OperatingPoint {
-            x: point.x.clone(),
-            u: point.u.clone(),
-            y: point.y.clone(),
-        },
-        None => OperatingPoint::zero(n, b.ncols(), p),
-    };
-    Ok(Mode {
-        name: given.name.clone().unwrap_or(format!("mode {number}")),
-        e: channel("E", &given.e, n)?,
-        f: channel("F", &given.f, p)?,
-        a,
-        b,
-        c,
-        operating_point,
-    })
-}
-
-fn matrix(name: &str, given: &[Vec<f64>]) -> Result<DMatrix<f64>, String> {
-    let matrix = rows::from_rows(given)
-        .map_err(|what| format!("{name}: {what}: make all rows equally long"))?;
-    match matrix
-        .iter()
-        .position(|&value| check::number(value).is_err())
-    {
-        Some(entry) => Err(format!(
-            "{name}: the entry in row {}, column {} {}",
-            entry % matrix.nrows() + 1,
-            entry / matrix.nrows() + 1,
-            check::number(matrix[entry]).err().unwrap_or_default()
-        )),
-        None => Ok(matrix),
-    }
-}
-
-/// Refuses what no solver could finish.
-fn check_sizes(plant: &SwitchedPlant, dims: Dimensions) -> Result<(), String> {
-    let sizes = [
-        ("states (rows of A)", dims.states),
-        ("inputs (columns of B)", dims.inputs),
-        ("outputs (rows of C)", dims.outputs),
-        ("disturbances (columns of E and F)", dims.disturbances),
-    ];
-    if let Some((what, size)) = sizes.iter().find(|(_, size)| *size > LARGEST_SIZE) {
-        return Err(format!(
-            "mode 1: there are {size} {what}: reduce the model to at most {LARGEST_SIZE}"
-        ));
-    }
-    for (index, mode) in plant.modes.iter().enumerate() {
-        let point = &mode.operating_point;
-        for (name, values) in [("x", &point.x), ("u", &point.u), ("y", &point.y)] {
-            at(
-                &format!("mode {}: operating_point.{name}", index + 1),
-                check::each(values, check::number),
-            )?;
-        }
-    }
-    Ok(())
-}
-
-fn signals(
-    given: &schema::Signals,
-    plant: &SwitchedPlant,
-    dims: Dimensions,
-) -> Result<Signals, String> {
+fn signals(given: &schema::Signals, found: &plant::Found) -> Result<Signals, String> {
+    let plant = &found.plant;
+    let dims = plant.dimensions();
     let points = |pick: fn(&OperatingPoint) -> &Vec<f64>| -> Vec<&[f64]> {
         let modes = plant.modes.iter();
         modes.map(|m| pick(&m.operating_point).as_slice()).collect()
@@ -248,13 +108,26 @@ fn signals(
         dims.outputs,
         &points(|p| &p.y),
     )?;
-    let states = channels("states", "x", &given.states, dims.states, &points(|p| &p.x))?;
+    let own = dims.states - found.held_inputs;
+    let mut states = channels("states", "x", &given.states, own, &points(|p| &p.x))?;
+    states.extend(inputs.iter().take(found.held_inputs).map(held));
     Ok(Signals {
         inputs,
         outputs,
         states,
         disturbances: Vec::new(),
     })
+}
+
+/// The state that remembers an input.
+fn held(input: &Signal) -> Signal {
+    Signal {
+        name: format!("{} held", input.name),
+        unit: input.unit.clone(),
+        nominal: input.nominal,
+        min: None,
+        max: None,
+    }
 }
 
 fn channels(
@@ -313,12 +186,16 @@ fn signal(info: &SignalInfo, default_name: String, operating: f64) -> Result<Sig
     let range = min.zip(max).map(|(min, max)| (max - min) / 2.0);
     let operating = (operating > 0.0).then_some(operating);
     let name = info.name.clone().unwrap_or(default_name);
-    if name.trim().is_empty() || name.chars().any(char::is_control) {
+    if name.trim().is_empty() || !check::printable(&name) {
         return Err("name is empty or not printable: give a name, or leave the key out".into());
+    }
+    let unit = info.unit.clone().filter(|unit| !unit.trim().is_empty());
+    if unit.as_deref().is_some_and(|unit| !check::printable(unit)) {
+        return Err("unit has a character that is not printable: give the unit's letters".into());
     }
     Ok(Signal {
         name,
-        unit: info.unit.clone().filter(|unit| !unit.trim().is_empty()),
+        unit,
         nominal: info.nominal.or(operating).or(range).unwrap_or(1.0),
         min,
         max,
@@ -596,7 +473,10 @@ fn hypotheses(given: &schema::Estimator, dims: Dimensions) -> Result<HypothesesS
 }
 
 fn database(given: &schema::Estimator, logs: &Logs) -> Result<DatabaseSource, String> {
-    let is_log = |name: &str| name.to_lowercase().ends_with(".csv");
+    let is_log = |name: &str| {
+        let name = name.to_lowercase();
+        LOG_ENDINGS.iter().any(|ending| name.ends_with(ending))
+    };
     let files = match &given.database {
         None => return Ok(defaults::DATABASE),
         Some(NameOrList::Name(name)) if name == "commission" => {
@@ -663,7 +543,7 @@ struct ScenarioContext<'a> {
     signals: &'a Signals,
     plant: &'a SwitchedPlant,
     dims: Dimensions,
-    folder: &'a Path,
+    tables: Tables<'a>,
 }
 
 impl ScenarioContext<'_> {
@@ -751,7 +631,7 @@ impl ScenarioContext<'_> {
         }
         let waveform = |(index, signal): (usize, &SignalOverTime)| {
             signal
-                .waveform(self.folder)
+                .waveform(self.tables)
                 .map_err(|what| format!("scenario.{key}[{}]: {what}", index + 1))
         };
         given.iter().enumerate().map(waveform).collect()

@@ -96,3 +96,10 @@ pub fn identifier(name: &str) -> Result<(), String> {
         ))
     }
 }
+
+/// Whether a text can stand in every file that is written, XML among them.
+pub fn printable(text: &str) -> bool {
+    !text
+        .chars()
+        .any(|c| c.is_control() || matches!(c, '\u{fffe}' | '\u{ffff}'))
+}

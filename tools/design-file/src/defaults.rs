@@ -2,6 +2,8 @@
 //!
 //! | key | when absent |
 //! |---|---|
+//! | `continuous` | false: `A`, `B` and `E` give the next sample |
+//! | `mode.D` | zero |
 //! | `mode.name` | `mode 1`, `mode 2` ... |
 //! | `mode.E`, `mode.F` | zero |
 //! | `mode.operating_point` | zero |
@@ -25,6 +27,9 @@
 //! | `scenario.reference` | a step after a tenth of the run, of 1 if the output has no nominal value, else of a fifth of it |
 //! | `scenario.disturbance` | a sine of the known period and amplitude if both are given, else none |
 //! | `events.*.until`, ramp `until` | never |
+//! | table `time`, `estimator.time` | the column called `t`, `time`, `timestamp` or the like; if there is none, a row is a sample |
+//! | table `interpolation` | `hold` |
+//! | `scenario.plant` | the plant is what it was designed for |
 //!
 //! The other defaults are the constants below.
 

@@ -1,22 +1,16 @@
 //! Logs of healthy operation: from CSV files to the stretches of each mode, or one sentence.
 //!
 //! A row is one sample: the inputs that act from it on and the outputs measured at it, in physical
-//! units. Columns have the user's signal names or `u[1]`, `y[1]` ...; `t` (seconds) and `mode`
+//! units. Columns have the user's signal names or `u[1]`, `y[1]` ...; a time column and `mode`
 //! (from 1) are optional, every other column is ignored.
 
-use crate::{check, sentence, suggest, values::NameOrList};
-use csv::{ReaderBuilder, StringRecord, Trim};
+use crate::{check, notes::Notes, sentence, suggest, values::NameOrList};
 use ftc_design::commissioning::Database;
 use ftc_design::{Signal, Signals};
 use ftc_plant::{Mode, SwitchedPlant};
+use ftc_tables::{Clock, Place, Row as Cells, Table, TimeColumn, find_time_column};
 use nalgebra::DMatrix;
-use std::fs::File;
 use std::path::Path;
-
-/// The most rows a log may have.
-const LONGEST_LOG: usize = 1_000_000;
-/// How far a time step may be from the sample time, relative to it: logs print rounded times.
-const TIME_TOLERANCE: f64 = 0.05;
 
 /// What is logged, and where.
 pub struct Logs<'a> {
@@ -26,21 +20,10 @@ pub struct Logs<'a> {
     pub signals: &'a Signals,
     /// The design file's directory.
     pub folder: &'a Path,
-}
-
-/// Where a row stands in its file.
-#[derive(Clone, Copy)]
-struct Place {
-    /// Below the header, from 1.
-    row: usize,
-    /// In the file, from 1.
-    line: u64,
-}
-
-impl std::fmt::Display for Place {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        write!(f, "row {} (line {})", self.row, self.line)
-    }
+    /// The name of the time column, where the user gives it.
+    pub time: Option<&'a str>,
+    /// What the user should know of what was read.
+    pub notes: &'a Notes,
 }
 
 /// One sample of a log.
@@ -62,9 +45,8 @@ pub fn file_of(files: &NameOrList, mode: usize) -> &str {
 struct Columns {
     inputs: Vec<usize>,
     outputs: Vec<usize>,
-    time: Option<usize>,
+    time: Option<TimeColumn>,
     mode: Option<usize>,
-    names: Vec<String>,
 }
 
 impl Logs<'_> {
@@ -145,40 +127,40 @@ impl Logs<'_> {
     }
 
     fn rows(&self, path: &Path, only: Option<usize>) -> Result<Vec<Row>, String> {
-        let file = File::open(path)
-            .map_err(|error| format!("cannot be opened ({error}): check the path"))?;
-        let mut reader = ReaderBuilder::new().trim(Trim::All).from_reader(file);
-        let header = reader.headers().map_err(|error| damaged(&error))?.clone();
-        let columns = self.columns(&header)?;
+        let mut table = Table::open(path)?;
+        let columns = self.columns(table.names())?;
         if columns.mode.is_none() && only.is_none() && self.plant.modes.len() > 1 {
             return Err(format!(
                 "the plant has {} modes, but there is no column mode: add one, or list one file per mode",
                 self.plant.modes.len()
             ));
         }
+        let mut clock = columns.time.clone().map(Clock::new);
+        if clock.is_none() {
+            self.notes.add(format!(
+                "{}: no column is called t or time, so gaps cannot be noticed: name the time column by estimator.time",
+                path.display()
+            ));
+        }
         let mut rows = Vec::new();
-        let mut before = None;
-        for record in reader.records() {
-            let record = record.map_err(|error| damaged(&error))?;
-            let place = Place {
-                row: rows.len() + 1,
-                line: record.position().map_or(0, csv::Position::line),
-            };
-            if rows.len() == LONGEST_LOG {
-                return Err(format!("has more than {LONGEST_LOG} rows: shorten it"));
+        while let Some(cells) = table.next_row()? {
+            if let Some(clock) = &mut clock {
+                clock.read(&mut table, &cells)?;
             }
-            before = self.advance(&columns, &record, place, before)?;
-            rows.push(self.row(&columns, &record, place, only)?);
+            rows.push(self.row(&mut table, &columns, &cells, only)?);
         }
-        match rows.is_empty() {
-            true => Err("has no rows: record healthy operation".into()),
-            false => Ok(rows),
+        if rows.is_empty() {
+            return Err("has no rows: record healthy operation".into());
         }
+        if let Some(clock) = clock {
+            clock.check_uniform(self.plant.sample_time)?;
+        }
+        Ok(rows)
     }
 
     /// Finds the column of every signal.
-    fn columns(&self, header: &StringRecord) -> Result<Columns, String> {
-        let names: Vec<&str> = header.iter().collect();
+    fn columns(&self, header: &[String]) -> Result<Columns, String> {
+        let names: Vec<&str> = header.iter().map(String::as_str).collect();
         let known: Vec<&str> = [&self.signals.inputs, &self.signals.outputs]
             .into_iter()
             .flatten()
@@ -198,73 +180,41 @@ impl Logs<'_> {
             all("y", &self.signals.outputs)?,
         );
         // A signal that is called t or mode keeps its column.
-        let optional = |name: &str| -> Result<Option<usize>, String> {
-            let found = once(&names, name)?;
-            Ok(found.filter(|at| !inputs.contains(at) && !outputs.contains(at)))
-        };
+        let taken: Vec<usize> = inputs.iter().chain(&outputs).copied().collect();
+        let mode = once(&names, "mode")?.filter(|at| !taken.contains(at));
         Ok(Columns {
-            time: optional("t")?,
-            mode: optional("mode")?,
-            names: names.iter().map(ToString::to_string).collect(),
+            time: find_time_column(header, self.time, &taken)?,
+            mode,
             inputs,
             outputs,
         })
     }
 
-    /// The time of a row; refuses a gap after the one before.
-    fn advance(
-        &self,
-        columns: &Columns,
-        record: &StringRecord,
-        place: Place,
-        before: Option<f64>,
-    ) -> Result<Option<f64>, String> {
-        let Some(at) = columns.time else {
-            return Ok(None);
-        };
-        let now = columns.number(record, at, place)?;
-        let step = self.plant.sample_time;
-        match before {
-            Some(before) if ((now - before) / step - 1.0).abs() > TIME_TOLERANCE => Err(format!(
-                "{place}: t goes from {before} to {now}, but sample_time is {step}: \
-                 record without gaps, one row per sample"
-            )),
-            _ => Ok(Some(now)),
-        }
-    }
-
     fn row(
         &self,
+        table: &mut Table,
         columns: &Columns,
-        record: &StringRecord,
-        place: Place,
+        cells: &Cells,
         only: Option<usize>,
     ) -> Result<Row, String> {
-        let numbers = |at: &[usize]| -> Result<Vec<f64>, String> {
-            at.iter()
-                .map(|&at| columns.number(record, at, place))
-                .collect()
+        let mut numbers = |at: &[usize]| -> Result<Vec<f64>, String> {
+            at.iter().map(|&at| number(table, cells, at)).collect()
         };
+        let (inputs, outputs) = (numbers(&columns.inputs)?, numbers(&columns.outputs)?);
+        let said = columns.mode.map(|at| number(table, cells, at));
         Ok(Row {
-            mode: self.mode(columns, record, place, only)?,
-            inputs: numbers(&columns.inputs)?,
-            outputs: numbers(&columns.outputs)?,
+            mode: self.mode(said.transpose()?, cells.place, only)?,
+            inputs,
+            outputs,
         })
     }
 
     /// The mode of a row: what its column says, and what the file is for.
-    fn mode(
-        &self,
-        columns: &Columns,
-        record: &StringRecord,
-        place: Place,
-        only: Option<usize>,
-    ) -> Result<usize, String> {
-        let Some(at) = columns.mode else {
+    fn mode(&self, said: Option<f64>, place: Place, only: Option<usize>) -> Result<usize, String> {
+        let Some(number) = said else {
             return Ok(only.unwrap_or(0));
         };
         let modes = self.plant.modes.len();
-        let number = columns.number(record, at, place)?;
         let known = (1..=modes).find(|mode| *mode as f64 == number);
         match (known, only) {
             (Some(mode), Some(only)) if mode != only + 1 => Err(format!(
@@ -280,23 +230,9 @@ impl Logs<'_> {
     }
 }
 
-impl Columns {
-    fn number(&self, record: &StringRecord, at: usize, place: Place) -> Result<f64, String> {
-        let text = record.get(at).unwrap_or_default();
-        let value = text.parse::<f64>().ok();
-        value
-            .filter(|value| check::number(*value).is_ok())
-            .ok_or_else(|| {
-                let found = match text.is_empty() {
-                    true => "is empty".to_string(),
-                    false => format!("holds '{}'", sentence::shorten(text)),
-                };
-                format!(
-                    "{place}, column {}, {found}: a log needs a finite number in every cell",
-                    self.names[at]
-                )
-            })
-    }
+/// The number in a cell.
+fn number(table: &mut Table, cells: &Cells, at: usize) -> Result<f64, String> {
+    table.number(cells, at, |value| check::number(value).is_ok())
 }
 
 /// The column of a signal, under the user's name or under its number. A column that has the name
@@ -304,11 +240,6 @@ impl Columns {
 fn column(names: &[&str], name: &str, number: &str, known: &[&str]) -> Result<usize, String> {
     if let Some(at) = once(names, name)?.map_or_else(|| once(names, number), |at| Ok(Some(at)))? {
         return Ok(at);
-    }
-    if let [single] = names
-        && single.contains([';', '\t'])
-    {
-        return Err("has a single column: separate columns by commas".into());
     }
     let wanted = match name == number {
         true => name.to_string(),
@@ -332,24 +263,6 @@ fn once(names: &[&str], wanted: &str) -> Result<Option<usize>, String> {
     match (found.next(), found.next()) {
         (_, Some(_)) => Err(format!("has two columns {wanted}: keep one of them")),
         (first, None) => Ok(first),
-    }
-}
-
-fn damaged(error: &csv::Error) -> String {
-    match error.kind() {
-        csv::ErrorKind::UnequalLengths {
-            pos,
-            expected_len,
-            len,
-        } => format!(
-            "line {} has {len} cells, but the header has {expected_len}: give every row a cell for each column",
-            pos.as_ref().map_or(0, csv::Position::line)
-        ),
-        csv::ErrorKind::Utf8 { pos, .. } => format!(
-            "line {} is not UTF-8: save the log as UTF-8 text",
-            pos.as_ref().map_or(0, csv::Position::line)
-        ),
-        _ => format!("cannot be read ({error}): name a CSV file"),
     }
 }
 

@@ -30,16 +30,19 @@ pub mod check;
 pub mod defaults;
 mod error;
 pub mod healthy_log;
+mod notes;
+mod plant;
 pub mod schema;
 pub mod sentence;
 mod signal;
 pub mod suggest;
+mod true_plant;
 pub mod values;
 
 pub use error::Error;
 use ftc_design::assembly::Request;
+use notes::Notes;
 use schema::DesignFile;
-use std::fs::File;
 use std::io::Read;
 use std::path::Path;
 use values::NameOrList;
@@ -55,6 +58,8 @@ pub struct Loaded {
     pub file: DesignFile,
     /// What it asks for, with every default filled in and every log read.
     pub request: Request,
+    /// What its user should know of the files it names: one sentence each.
+    pub notes: Vec<String>,
 }
 
 /// Reads a design file, and the tables and logs that it names relative to its own folder.
@@ -75,9 +80,14 @@ pub fn read(path: &Path) -> Result<Loaded, Error> {
 /// What is wrong with it, with the key and line at fault.
 pub fn parse(text: &str, folder: &Path) -> Result<Loaded, Error> {
     let file = deserialize(text)?;
-    let request =
-        assemble::request(&file, folder).map_err(|sentence| Error::of_request(text, sentence))?;
-    Ok(Loaded { file, request })
+    let notes = Notes::default();
+    let request = assemble::request(&file, folder, &notes)
+        .map_err(|sentence| Error::of_request(text, sentence))?;
+    Ok(Loaded {
+        file,
+        request,
+        notes: notes.into_sentences(),
+    })
 }
 
 fn deserialize(text: &str) -> Result<DesignFile, Error> {
@@ -104,19 +114,17 @@ pub fn noise_is_unknown(file: &DesignFile) -> bool {
 /// # Errors
 /// The end of a sentence that begins with the file's name.
 pub fn load(path: &Path) -> Result<String, String> {
-    if path.is_dir() {
-        return Err("this is a directory: name a design file (TOML) in it".into());
-    }
-    let file = File::open(path).map_err(|error| {
-        format!("cannot be opened ({error}): check the path and its permissions")
-    })?;
     let mut bytes = Vec::new();
-    file.take(LARGEST_FILE + 1)
+    ftc_tables::open_regular(path, LARGEST_FILE)
+        .map_err(|what| match path.is_dir() {
+            true => "this is a directory: name a design file (TOML) in it".into(),
+            false => what,
+        })?
         .read_to_end(&mut bytes)
         .map_err(|error| format!("cannot be read ({error}): check the path"))?;
     if bytes.len() as u64 > LARGEST_FILE {
         return Err(format!(
-            "this is larger than {} MB and no design file: name a TOML file, and put long tables into CSV files",
+            "is larger than {} MB: put long tables into CSV files",
             LARGEST_FILE >> 20
         ));
     }

@@ -5,7 +5,7 @@
 //! [`crate::defaults`]; what a value must satisfy, in [`crate::check`].
 
 use crate::signal::{Event, Signal};
-use crate::values::{NameOrList, NumberOrList};
+use crate::values::{Matrix, NameOrList, NumberOrList};
 use ftc_plant::rectifier::Rectifier;
 use serde::Deserialize;
 
@@ -17,6 +17,8 @@ pub struct DesignFile {
     pub name: String,
     /// `Te` in seconds.
     pub sample_time: f64,
+    /// Whether `A`, `B`, `E` describe `dx/dt` rather than the next sample.
+    pub continuous: Option<bool>,
     /// The modes of the plant, `[[mode]]`; none where the plant has a model with a name.
     #[serde(rename = "mode", default)]
     pub modes: Vec<Mode>,
@@ -52,27 +54,35 @@ pub enum PlantModel {
     Rectifier(Rectifier),
 }
 
-/// One `[[mode]]`; matrices are lists of rows.
+/// One `[[mode]]`; a matrix is a list of rows, or the name of a variable in `file`.
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Mode {
     /// What the user calls it.
     pub name: Option<String>,
+    /// A MATLAB (`.mat`) or NumPy (`.npz`) file with the matrices that are not given as rows.
+    pub file: Option<String>,
+    /// The structure in `file` whose fields the matrices are.
+    #[serde(rename = "struct")]
+    pub structure: Option<String>,
     /// State matrix (n x n).
     #[serde(rename = "A")]
-    pub a: Vec<Vec<f64>>,
+    pub a: Option<Matrix>,
     /// Input matrix (n x m).
     #[serde(rename = "B")]
-    pub b: Vec<Vec<f64>>,
+    pub b: Option<Matrix>,
     /// Output matrix (p x n).
     #[serde(rename = "C")]
-    pub c: Vec<Vec<f64>>,
+    pub c: Option<Matrix>,
+    /// Direct feedthrough from input to output (p x m).
+    #[serde(rename = "D")]
+    pub d: Option<Matrix>,
     /// Disturbance to state (n x s).
     #[serde(rename = "E")]
-    pub e: Option<Vec<Vec<f64>>>,
+    pub e: Option<Matrix>,
     /// Disturbance to output (p x s).
     #[serde(rename = "F")]
-    pub f: Option<Vec<Vec<f64>>>,
+    pub f: Option<Matrix>,
     /// The steady state around which the mode is linear.
     pub operating_point: Option<OperatingPoint>,
 }
@@ -213,6 +223,8 @@ pub struct Estimator {
     pub response_length: Option<i64>,
     /// `commission`, `model`, the name of a CSV file, or a list of one per mode.
     pub database: Option<NameOrList>,
+    /// The time column of the logs, where it has no usual name.
+    pub time: Option<String>,
     /// Residual that flags a fault, per sensor (number or p).
     pub threshold: Option<NumberOrList>,
     /// The same in standard deviations of the healthy residual.
@@ -301,6 +313,65 @@ pub struct Scenario {
     pub disturbance: Option<Vec<Signal>>,
     /// Faults that are more than an addition.
     pub events: Option<Vec<Event>>,
+    /// How the true plant departs from the model.
+    pub plant: Option<TruePlant>,
+}
+
+/// `[scenario.plant]`: the true plant, as far as it is not what the design is made for.
+#[derive(Clone, Debug, Default, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct TruePlant {
+    /// Other matrices, one entry per mode; a matrix that is left out is that of the model.
+    #[serde(rename = "mode")]
+    pub modes: Option<Vec<Mode>>,
+    /// Largest relative error of the entries of `A`, `B` and `E`.
+    pub relative_error: Option<f64>,
+    /// Seed of these errors.
+    pub seed: Option<i64>,
+    /// Gain of each actuator (number or m).
+    pub input_gain: Option<NumberOrList>,
+    /// Samples by which every reading is late.
+    pub sensor_delay: Option<i64>,
+    /// Samples by which the mode is told late.
+    pub mode_delay: Option<i64>,
+    /// Times at which another mode is told.
+    pub told: Option<Vec<Told>>,
+    /// Constants added to inputs, disturbances or states for a while.
+    pub loads: Option<Vec<Load>>,
+    /// Faults of actuators; they name an `input` where a sensor's name a `sensor`.
+    pub actuator: Option<Vec<Event>>,
+}
+
+/// Another mode is told for a while.
+#[derive(Clone, Copy, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Told {
+    /// Seconds.
+    pub from: f64,
+    /// Seconds.
+    #[serde(default = "crate::signal::for_ever")]
+    pub until: f64,
+    /// Number of the mode, from 1.
+    pub mode: i64,
+}
+
+/// A constant added to an input, a disturbance or a state.
+#[derive(Clone, Copy, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Load {
+    /// Number of the input, from 1.
+    pub input: Option<i64>,
+    /// Number of the disturbance, from 1.
+    pub disturbance: Option<i64>,
+    /// Number of the state, from 1.
+    pub state: Option<i64>,
+    /// Seconds.
+    pub from: f64,
+    /// Seconds.
+    #[serde(default = "crate::signal::for_ever")]
+    pub until: f64,
+    /// What is added.
+    pub size: f64,
 }
 
 /// A mode (from 1) and the time in seconds from which it is active.

@@ -1,6 +1,8 @@
 //! Signals over time, and faults of sensors, as the user writes them.
 
+use crate::notes::Notes;
 use ftc_plant::scenario::{FaultEvent, FaultKind, Waveform};
+use ftc_tables::{Clock, Interpolation, Table, find_time_column, resample};
 use serde::de::value::MapAccessDeserializer;
 use serde::de::{Deserialize, Deserializer, Error, MapAccess, Visitor};
 use std::fmt;
@@ -46,7 +48,44 @@ enum Shape {
     Table {
         file: String,
         column: String,
+        #[serde(default)]
+        time: Option<String>,
+        #[serde(default)]
+        interpolation: Between,
     },
+}
+
+/// Values of a table's `interpolation`: what a signal is between two of its rows.
+#[derive(Clone, Copy, Debug, Default, serde::Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Between {
+    /// What the earlier row says.
+    #[default]
+    Hold,
+    /// A straight line.
+    Linear,
+}
+
+impl From<Between> for Interpolation {
+    fn from(between: Between) -> Self {
+        match between {
+            Between::Hold => Self::Hold,
+            Between::Linear => Self::Linear,
+        }
+    }
+}
+
+/// Where tables are, and how they are played.
+#[derive(Clone, Copy, Debug)]
+pub struct Tables<'a> {
+    /// The design file's directory.
+    pub folder: &'a Path,
+    /// Seconds between two samples.
+    pub sample_time: f64,
+    /// The longest scenario in samples.
+    pub most_samples: usize,
+    /// What the user should know of what was read.
+    pub notes: &'a Notes,
 }
 
 /// A fault of one sensor during `[from, until)`; sensors count from 1, times are in seconds.
@@ -55,6 +94,7 @@ enum Shape {
 pub enum Event {
     /// Adds `size`.
     Bias {
+        #[serde(alias = "input")]
         sensor: i64,
         from: f64,
         #[serde(default = "for_ever")]
@@ -63,6 +103,7 @@ pub enum Event {
     },
     /// Adds `slope` per second.
     Drift {
+        #[serde(alias = "input")]
         sensor: i64,
         from: f64,
         #[serde(default = "for_ever")]
@@ -71,6 +112,7 @@ pub enum Event {
     },
     /// Loses the fraction `loss` of the reading.
     GainLoss {
+        #[serde(alias = "input")]
         sensor: i64,
         from: f64,
         #[serde(default = "for_ever")]
@@ -79,6 +121,7 @@ pub enum Event {
     },
     /// Keeps the last reading.
     Stuck {
+        #[serde(alias = "input")]
         sensor: i64,
         from: f64,
         #[serde(default = "for_ever")]
@@ -86,6 +129,7 @@ pub enum Event {
     },
     /// Adds `size` during the first half of each `period`.
     Intermittent {
+        #[serde(alias = "input")]
         sensor: i64,
         from: f64,
         #[serde(default = "for_ever")]
@@ -95,6 +139,7 @@ pub enum Event {
     },
     /// Gives no number.
     Dropout {
+        #[serde(alias = "input")]
         sensor: i64,
         from: f64,
         #[serde(default = "for_ever")]
@@ -103,7 +148,7 @@ pub enum Event {
 }
 
 /// An end that never comes.
-fn for_ever() -> f64 {
+pub(crate) fn for_ever() -> f64 {
     f64::MAX
 }
 
@@ -134,7 +179,7 @@ impl Signal {
     ///
     /// # Errors
     /// One sentence, to be put after the signal's key.
-    pub fn waveform(&self, folder: &Path) -> Result<Waveform, String> {
+    pub fn waveform(&self, tables: Tables) -> Result<Waveform, String> {
         let waveform = match &self.0 {
             Shape::Constant { value } => Waveform::Constant {
                 value: finite("value", *value)?,
@@ -176,9 +221,18 @@ impl Signal {
                     until: *until,
                 }
             }
-            Shape::Table { file, column } => Waveform::Table {
-                values: read_column(&folder.join(file), column)?,
-            },
+            Shape::Table {
+                file,
+                column,
+                time,
+                interpolation,
+            } => {
+                let path = tables.folder.join(file);
+                let values = tables
+                    .read(&path, column, time.as_deref(), (*interpolation).into())
+                    .map_err(|what| format!("{}: {what}", path.display()))?;
+                Waveform::Table { values }
+            }
         };
         Ok(waveform)
     }
@@ -190,6 +244,18 @@ impl Event {
     /// # Errors
     /// One sentence, to be put after the event's key.
     pub fn fault(&self, sensors: usize) -> Result<FaultEvent, String> {
+        self.fault_of("sensor", sensors, "outputs")
+    }
+
+    /// The event for an actuator of a plant with `inputs` inputs.
+    ///
+    /// # Errors
+    /// One sentence, to be put after the event's key.
+    pub fn actuator_fault(&self, inputs: usize) -> Result<FaultEvent, String> {
+        self.fault_of("input", inputs, "inputs")
+    }
+
+    fn fault_of(&self, what: &str, count: usize, things: &str) -> Result<FaultEvent, String> {
         let (sensor, from, until, kind) = match *self {
             Self::Bias {
                 sensor,
@@ -246,7 +312,7 @@ impl Event {
             } => (sensor, from, until, FaultKind::Dropout),
         };
         interval(from, until)?;
-        let sensor = crate::check::index("sensor", sensor, sensors, "outputs")?;
+        let sensor = crate::check::index(what, sensor, count, things)?;
         Ok(FaultEvent {
             sensor,
             from,
@@ -256,7 +322,7 @@ impl Event {
     }
 }
 
-fn finite(key: &str, value: f64) -> Result<f64, String> {
+pub(crate) fn finite(key: &str, value: f64) -> Result<f64, String> {
     crate::check::number(value)
         .map(|()| value)
         .map_err(|what| format!("{key} {what}"))
@@ -268,7 +334,7 @@ fn positive(key: &str, value: f64) -> Result<f64, String> {
         .map_err(|what| format!("{key} {what}"))
 }
 
-fn interval(from: f64, until: f64) -> Result<(), String> {
+pub(crate) fn interval(from: f64, until: f64) -> Result<(), String> {
     if !(from.is_finite() && from >= 0.0) {
         return Err(format!(
             "from is {from}: give a time in seconds, 0 or later"
@@ -304,52 +370,56 @@ fn ascending(points: &[[f64; 2]]) -> Result<Vec<[f64; 2]>, String> {
     }
 }
 
-/// The most rows a CSV file may have.
-const LONGEST_TABLE: usize = 1_000_000;
-
-/// One column of a CSV file with a header, one row per sample.
-fn read_column(path: &Path, column: &str) -> Result<Vec<f64>, String> {
-    let shown = path.display();
-    let mut reader = csv::ReaderBuilder::new()
-        .trim(csv::Trim::All)
-        .from_path(path)
-        .map_err(|error| format!("cannot read the CSV file {shown}: {error}"))?;
-    let header = reader
-        .headers()
-        .map_err(|error| format!("the CSV file {shown} has no readable header: {error}"))?
-        .clone();
-    let Some(at) = header.iter().position(|name| name == column) else {
-        let names: Vec<&str> = header.iter().collect();
-        let nearest = crate::suggest::nearest(column, &names);
-        return Err(format!(
-            "the CSV file {shown} has no column {column}: {nearest}"
-        ));
-    };
-    let mut values = Vec::new();
-    for (row, record) in reader.records().enumerate() {
-        let record = record.map_err(|error| format!("the CSV file {shown} is damaged: {error}"))?;
-        let text = record.get(at).unwrap_or_default();
-        let value = text
-            .parse::<f64>()
-            .ok()
-            .filter(|v| crate::check::number(*v).is_ok());
-        values.push(value.ok_or_else(|| {
-            format!(
-                "the CSV file {shown} has '{}' in column {column}, row {}: give a finite number",
-                crate::sentence::shorten(text),
-                row + 1
-            )
-        })?);
-        if values.len() > LONGEST_TABLE {
-            return Err(format!(
-                "the CSV file {shown} has more than {LONGEST_TABLE} rows: shorten it"
-            ));
+impl Tables<'_> {
+    /// One column of a table, a value for each sample. With a time column the signal is what the
+    /// table says at the sample's time; without one a row is a sample.
+    fn read(
+        self,
+        path: &Path,
+        column: &str,
+        time: Option<&str>,
+        interpolation: Interpolation,
+    ) -> Result<Vec<f64>, String> {
+        let mut table = Table::open(path)?;
+        let names = table.names();
+        let Some(at) = names.iter().position(|name| name == column) else {
+            let known: Vec<&str> = names.iter().map(String::as_str).collect();
+            let nearest = super::suggest::nearest(column, &known);
+            return Err(format!("has no column {column}: {nearest}"));
+        };
+        let mut clock = find_time_column(names, time, &[at])?.map(Clock::new);
+        let mut values = Vec::new();
+        while let Some(row) = table.next_row()? {
+            if let Some(clock) = &mut clock {
+                clock.read(&mut table, &row)?;
+            }
+            values.push(table.number(&row, at, |value| super::check::number(value).is_ok())?);
         }
+        if values.is_empty() {
+            return Err("has no rows: give at least one".into());
+        }
+        let Some(clock) = clock else {
+            self.notes.add(format!(
+                "{}: no column is called t or time, so each row is taken for one sample of {} s: \
+                 name the time column by time = \"...\"",
+                path.display(),
+                self.sample_time
+            ));
+            return Ok(values);
+        };
+        clock.check_ascending()?;
+        if clock.times().last().is_some_and(|&last| last < 0.0) {
+            return Err(
+                "ends before time 0: let its times count from the start of the scenario".into(),
+            );
+        }
+        let (times, step) = (clock.times(), self.sample_time);
+        Ok(resample(
+            times,
+            &values,
+            step,
+            interpolation,
+            self.most_samples,
+        ))
     }
-    if values.is_empty() {
-        return Err(format!(
-            "the CSV file {shown} has no rows: give at least one"
-        ));
-    }
-    Ok(values)
 }

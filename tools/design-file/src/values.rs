@@ -83,3 +83,35 @@ impl<'de> Deserialize<'de> for NameOrList {
         deserializer.deserialize_any(Either)
     }
 }
+
+/// A matrix as its rows, or the name of a variable in a file.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Matrix {
+    /// Its rows.
+    Rows(Vec<Vec<f64>>),
+    /// Where it is.
+    Name(String),
+}
+
+impl<'de> Deserialize<'de> for Matrix {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        struct Either;
+        impl<'de> Visitor<'de> for Either {
+            type Value = Matrix;
+            fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+                f.write_str("a list of rows, or the name of a variable in file")
+            }
+            fn visit_str<E: Error>(self, name: &str) -> Result<Matrix, E> {
+                Ok(Matrix::Name(name.to_string()))
+            }
+            fn visit_seq<A: SeqAccess<'de>>(self, mut list: A) -> Result<Matrix, A::Error> {
+                let mut rows = Vec::new();
+                while let Some(row) = list.next_element()? {
+                    rows.push(row);
+                }
+                Ok(Matrix::Rows(rows))
+            }
+        }
+        deserializer.deserialize_any(Either)
+    }
+}

@@ -47,7 +47,7 @@ def discretise(
     a: list[list[float]], b: list[list[float]], sample_time: float
 ) -> tuple[list[list[float]], list[list[float]]]: ...
 def identify(
-    logs: list[tuple[list[list[float]], list[list[float]], list[int]]], order: int | None
+    logs: list[tuple[list[list[float]], list[list[float]], list[int]]], order: int | None, periods: list[float]
 ) -> tuple[
     int,
     list[tuple[int, float]],

@@ -40,7 +40,7 @@ class Design:
 
     def __init__(self, core: _core.Design, document: dict[str, Any], folder: Path) -> None:
         """Wraps what was solved."""
-        self._core = core
+        self.core = core
         self._folder = folder
         self.document = document
         self.report: dict[str, Any] = json.loads(core.json())
@@ -58,7 +58,7 @@ class Design:
 
     def record(self) -> dict[str, Any]:
         """Returns the design as it ships in an FMU, `resources/design.json`: every gain and matrix."""
-        return json.loads(self._core.record())[0]
+        return json.loads(self.core.record())[0]
 
     def to_toml(self) -> str:
         """Returns the design file; `ftc_fmu.load` of it makes the same design."""
@@ -99,7 +99,7 @@ class Design:
         text = None
         if scenario is not None:
             text = to_toml(self.document | {"scenario": plain(dict(scenario), "scenario")})
-        return Run(self._core.simulate(text, str(self._folder), baselines))
+        return Run(self.core.simulate(text, str(self._folder), baselines))
 
     def export(
         self,
@@ -126,19 +126,19 @@ class Design:
         if fmi != "2.0":
             raise DesignFileError(f'fmi is "{fmi}": FMUs of version "2.0" are written, no other', "fmi")
         wanted = None if platforms is None else list(platforms)
-        return [Path(path) for path in self._core.export(str(Path(out)), HOME, ssp, wanted)]
+        return [Path(path) for path in self.core.export(str(Path(out)), HOME, ssp, wanted)]
 
     def controller(self) -> Controller:
         """Returns the controller itself: the code that runs in the FMU, at rest in mode 1."""
-        return Controller(self._core.controller())
+        return Controller(self.core.controller())
 
     def __reduce__(self) -> tuple:
         """Pickles what was solved, so that no worker solves again."""
-        return _restored, (self._core.record(), self.document, str(self._folder))
+        return _restored, (self.core.record(), self.document, str(self._folder))
 
     def __str__(self) -> str:
         """Returns the report that `ftc-fmu design` prints."""
-        return self._core.text()
+        return self.core.text()
 
     def __repr__(self) -> str:
         """Returns one line: name, modes, gains."""
@@ -147,7 +147,7 @@ class Design:
 
     def _repr_html_(self) -> str:
         """Shows the report in a notebook."""
-        return self._core.html()
+        return self.core.html()
 
 
 def design(plant: Plant, *, name: str = "design", progress: Progress = None, **keys: Any) -> Design:  # noqa: ANN401
@@ -181,7 +181,7 @@ def design(plant: Plant, *, name: str = "design", progress: Progress = None, **k
     if control:
         document["controller"] = plain(control, "controller")
     document |= {key: plain(dict(table), key) for key, table in tables.items() if table is not None}
-    return Design(_core.solve(to_toml(document), str(folder), None, _listener(progress)), document, folder)
+    return Design(_core.solve(to_toml(document), str(folder), None, listener(progress)), document, folder)
 
 
 def load(path: str | PathLike[str], *, progress: Progress = None) -> Design:
@@ -198,7 +198,7 @@ def load(path: str | PathLike[str], *, progress: Progress = None) -> Design:
     """
     path = Path(path)
     text = _core.read_text(str(path))
-    core = _core.solve(text, str(path.parent), str(path), _listener(progress))
+    core = _core.solve(text, str(path.parent), str(path), listener(progress))
     return Design(core, tomllib.loads(text.removeprefix("\ufeff")), path.parent)
 
 
@@ -206,7 +206,8 @@ def _restored(record: bytes, document: dict[str, Any], folder: str) -> Design:
     return Design(_core.restore(record), document, Path(folder))
 
 
-def _listener(progress: Progress) -> Callable[[str, float], None] | None:
+def listener(progress: Progress) -> Callable[[str, float], None] | None:
+    """Returns what to call with progress: one's own function, or one that prints."""
     if progress is True:
         return lambda what, seconds: print(f"{what} ({seconds:.0f} s)", flush=True)
     return progress or None

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -13,7 +13,7 @@ from ftc_fmu.log import Log
 from ftc_fmu.plant import Plant
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Mapping, Sequence
 
 
 @dataclass(frozen=True)
@@ -56,13 +56,17 @@ class Identification:
         return "\n".join(lines)
 
 
-def identify(logs: Log | Sequence[Log], order: int | None = None) -> Identification:
+def identify(
+    logs: Log | Sequence[Log], order: int | None = None, disturbance: Mapping[str, Any] | None = None
+) -> Identification:
     """Identifies a plant from logs of healthy operation (subspace identification).
 
     Args:
         logs: One log, or several of the same signals. Where no log says its `mode`, several logs
             are one mode each, in their order.
         order: Number of states; by default the smallest that fits validation data nearly as well as the best.
+        disturbance: `{"period": seconds, "harmonics": count}` of a periodic disturbance that is in the
+            logs and that nobody measured; it is told from the plant.
 
     Raises:
         DesignFileError: One sentence about what the logs lack.
@@ -80,7 +84,10 @@ def identify(logs: Log | Sequence[Log], order: int | None = None) -> Identificat
     for number, log in enumerate(logs, 1):
         mode = log.mode if log.mode is not None else np.full(len(log), number if unsaid else 1)
         data.append((log.u.tolist(), log.y.tolist(), [int(value) for value in mode]))
-    chosen, tried, modes, coordinates, switch_fit = _core.identify(data, order)
+    known = dict(disturbance or {})
+    harmonics = range(1, int(known.get("harmonics", 1)) + 1) if known else ()
+    periods = [float(known["period"]) / (first.sample_time * harmonic) for harmonic in harmonics]
+    chosen, tried, modes, coordinates, switch_fit = _core.identify(data, order, periods)
     points = [dict(zip("xuy", point, strict=True)) for _, _, _, point, _, _, _ in modes]
     plant = Plant(
         [(A, B, C) for A, B, C, *_ in modes],

@@ -219,11 +219,13 @@ class Plant:
         return from_fmu(path, inputs, outputs, operating_points, **options)
 
     @classmethod
-    def identify(cls, logs: Log | Sequence[Log], order: int | None = None) -> Identification:
+    def identify(
+        cls, logs: Log | Sequence[Log], order: int | None = None, disturbance: Mapping[str, Any] | None = None
+    ) -> Identification:
         """Identifies a plant from logs of healthy operation; see `ftc_fmu.identification`."""
         from ftc_fmu.identification import identify  # noqa: PLC0415  (that module needs this one)
 
-        return identify(logs, order)
+        return identify(logs, order, disturbance)
 
 
 def _operating_point(point: Mapping[str, Any]) -> OperatingPoint:

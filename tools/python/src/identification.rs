@@ -59,12 +59,14 @@ type Answer = (
     Option<f64>,
 );
 
-/// Models of the modes from logs: per log inputs, outputs (rows of samples) and modes (from 1).
+/// Models of the modes from logs: per log inputs, outputs (rows of samples) and modes (from 1);
+/// `periods` in samples.
 #[pyfunction]
 pub fn identify(
     py: Python<'_>,
     logs: Vec<(Rows, Rows, Vec<usize>)>,
     order: Option<usize>,
+    periods: Vec<f64>,
 ) -> PyResult<Answer> {
     let logs: Vec<Log> = logs
         .into_iter()
@@ -82,6 +84,7 @@ pub fn identify(
         .collect::<PyResult<_>>()?;
     let settings = Settings {
         order,
+        periods,
         ..Settings::default()
     };
     let found = wait(py, "identifying", None, move || {

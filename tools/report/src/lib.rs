@@ -17,6 +17,7 @@ mod demo;
 pub mod documentation;
 pub mod figure;
 pub mod page;
+pub mod robustness;
 mod running_loop;
 pub mod simulate;
 pub mod style;

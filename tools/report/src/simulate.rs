@@ -1,5 +1,6 @@
 //! Every variant of the loop, simulated natively and written down sample by sample.
 
+use crate::robustness;
 use crate::table::{Table, number};
 use crate::warnings;
 use ftc_control::Controller;
@@ -23,7 +24,7 @@ pub struct Simulation {
 }
 
 /// Runs the scenario in every variant, and with every baseline if asked for:
-/// `trajectories.csv`, `metrics.json` and the report. `warnings` are those of the design.
+/// `trajectories.csv`, `metrics.json`, `robustness.json` and the report. `warnings` are those of the design.
 ///
 /// # Errors
 /// One sentence about a baseline.
@@ -41,20 +42,26 @@ pub fn simulate(
         bound = Some(comparison::bound(design, &trajectories[0]));
     }
     warnings.extend(warnings::of_runs(design, &trajectories));
+    let cases = robustness::cases(design);
+    warnings.extend(robustness::warnings(design, &cases));
     let csv = table(design, &trajectories).map_err(|error| error.to_string())?;
     let metrics = metrics(design, &trajectories, bound.as_deref(), &warnings);
+    let tried = format!("{:#}\n", robustness::json(&cases));
     let mut files = vec![
         ("trajectories.csv".to_string(), csv),
         ("metrics.json".to_string(), metrics.into_bytes()),
+        ("robustness.json".to_string(), tried.into_bytes()),
     ];
-    let page = crate::files(design, &trajectories, &warnings);
+    let section = robustness::section(design, &cases);
+    let page = crate::files(design, &trajectories, &warnings, section);
     files.extend(
         page.into_iter()
             .map(|(name, text)| (name, text.into_bytes())),
     );
     Ok(Simulation {
         files,
-        summary: summary(design, &trajectories, bound.as_deref()),
+        summary: summary(design, &trajectories, bound.as_deref())
+            + &robustness::text(design, &cases),
         warnings,
         trajectories,
     })

@@ -251,7 +251,7 @@ fn keep(name: &str, design: &Design, trajectories: &[Trajectory]) {
         .join("../../target/pages")
         .join(name);
     std::fs::create_dir_all(&folder).expect("a folder");
-    for (name, text) in super::files(design, trajectories, &[]) {
+    for (name, text) in super::files(design, trajectories, &[], super::page::Section::new("None")) {
         if name.ends_with(".svg") {
             check_svg(&text);
         }

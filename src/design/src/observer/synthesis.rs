@@ -160,8 +160,10 @@ impl ErrorModel {
         for (i, j) in spec.lyapunov.observer_pairs(self.outputs.len()) {
             let found = check_detectable(&self.projected[i][j], &self.outputs[i], spec.decay);
             if let Err(magnitude) = found {
-                let reason = match magnitude < 1.0 {
-                    true => format!("ask for an observer decay above {magnitude:.4}"),
+                // What is printed has to be reachable: an eigenvalue just below 1 is none that decays.
+                let printed = (1e4 * magnitude).ceil() / 1e4;
+                let reason = match printed < 1.0 {
+                    true => format!("ask for an observer decay above {printed:.4}"),
                     false => "use a luenberger observer or more sensors".into(),
                 };
                 return Err(DesignError::Request(format!(

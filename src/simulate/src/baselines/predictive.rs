@@ -121,13 +121,13 @@ impl Predictive {
 
     /// Corrects state and output disturbance with the measurement; a lost sensor corrects nothing.
     fn correct(&mut self, seen: &PlantState) {
-        let mode = &self.plant.modes[seen.mode];
+        let mode = &self.plant.modes[seen.told];
         let expected = &mode.c * &self.estimate + mode.output_offset() + &self.offset;
         let innovation = DVector::from_fn(expected.len(), |i, _| {
             let error = seen.y[i] - expected[i];
             if error.is_finite() { error } else { 0.0 }
         });
-        let correction = &self.modes[seen.mode].kalman * innovation;
+        let correction = &self.modes[seen.told].kalman * innovation;
         let n = self.estimate.len();
         self.estimate += correction.rows(0, n);
         self.offset += correction.rows(n, self.offset.len());
@@ -135,10 +135,10 @@ impl Predictive {
 
     /// Solves the quadratic programme and takes the first command of the plan.
     fn plan(&mut self, seen: &PlantState) {
-        let mode = &self.plant.modes[seen.mode];
+        let mode = &self.plant.modes[seen.told];
         let point = &mode.operating_point;
         let start = self.starting_point(mode);
-        let planner = &mut self.modes[seen.mode];
+        let planner = &mut self.modes[seen.told];
         let wanted = DVector::from_fn(self.tracked.len(), |i, _| {
             seen.reference[i] - point.y[self.tracked[i]] - self.offset[self.tracked[i]]
         });
@@ -175,7 +175,7 @@ impl Regulator for Predictive {
     }
 
     fn advance(&mut self, seen: &PlantState, acting: &[f64]) {
-        let mode = &self.plant.modes[seen.mode];
+        let mode = &self.plant.modes[seen.told];
         self.estimate = &mode.a * &self.estimate
             + &mode.b * DVector::from_column_slice(acting)
             + mode.state_offset();

@@ -59,13 +59,15 @@ impl PlantSimulator {
 
     /// Advances the state, and leaves its change in the scratch.
     fn differentiate_state(&self, trial: &mut PlantState, u: &[f64], change: &Change<'_>) {
+        self.actuate(trial, u);
+        self.actuate_change(trial, change.command);
         if let TruePlant::Rectifier(rectifier) = &self.true_plant {
             rectifier::differentiate_rectifier(
                 rectifier,
                 trial.mode,
                 &trial.x,
                 &rectifier::Held {
-                    input: [u, change.command],
+                    input: [&trial.departed.applied, &trial.departed.change],
                     disturbance: [&trial.disturbance, change.disturbance],
                 },
                 self.plant.sample_time,
@@ -78,7 +80,7 @@ impl PlantSimulator {
             let Some(mode) = self.modes.get(trial.mode) else {
                 return;
             };
-            kernel::add_product(&mut trial.next, &mode.b, change.command);
+            kernel::add_product(&mut trial.next, &mode.b, &trial.departed.change);
             kernel::add_product(&mut trial.next, &mode.e, change.disturbance);
         }
     }
@@ -113,6 +115,8 @@ impl PlantSimulator {
         }
         kernel::add_product(&mut trial.y_true, &mode.f, change.disturbance);
         let (tick, events) = (trial.tick, external.mode.is_none());
+        // What a late sensor reads was on its way before the inputs changed.
+        let late = trial.departed.is_late();
         let read = trial
             .y
             .iter_mut()
@@ -121,6 +125,7 @@ impl PlantSimulator {
         let clean = trial.y_true.iter().zip(change.fault);
         for (sensor, (((y, fault), last), (&healthy, &added))) in read.zip(clean).enumerate() {
             let struck = self.striking(sensor, tick, events);
+            let healthy = if late { 0.0 } else { healthy };
             (*y, *fault) = differentiate_sensor(struck, healthy, added, last);
         }
     }

@@ -23,8 +23,15 @@ pub fn files(
     design: &Design,
     trajectories: &[Trajectory],
     warnings: &[String],
+    robustness: Section,
 ) -> Vec<(String, String)> {
-    let page = page(design, trajectories, warnings);
+    let mut page = page(design, trajectories, warnings);
+    let merits = page
+        .sections
+        .iter()
+        .position(|section| section.heading == MERITS);
+    page.sections
+        .insert(merits.map_or(0, |at| at + 1), robustness);
     let figures = page
         .figures()
         .map(|figure| (format!("{}.svg", figure.key), svg::document(figure)));
@@ -32,6 +39,9 @@ pub fn files(
     files.push(("report.html".into(), page.render()));
     files
 }
+
+/// Heading of the section that compares the variants.
+const MERITS: &str = "Figures of merit";
 
 /// Every variant, the one the page is about first.
 const RANKING: [Variant; 5] = [
@@ -99,7 +109,7 @@ pub fn page(design: &Design, trajectories: &[Trajectory], warnings: &[String]) -
                  without fault-tolerant control (FTC), beside the same controller told the true fault. Thin grey is what the sensor says in the loop with FTC. Shaded: the fault of this sensor is present.",
             )
             .figures(scene.outputs()),
-        Section::new("Figures of merit")
+        Section::new(MERITS)
             .with(Block::Table(tables::merits(design, trajectories)))
             .with(Block::Table(tables::variants(trajectories))),
     ]);

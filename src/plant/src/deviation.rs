@@ -1,0 +1,234 @@
+//! How a true plant departs from the model that describes it, apart from its matrices.
+
+use crate::scenario::{FaultEvent, first_tick};
+use crate::{Mode, SwitchedPlant};
+use core::fmt;
+use nalgebra::DMatrix;
+use rand_chacha::ChaCha8Rng;
+use rand_chacha::rand_core::{Rng, SeedableRng};
+use serde::{Deserialize, Serialize};
+
+/// Departures of the true plant; the default is none.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(default)]
+pub struct Deviation {
+    /// Gain of each actuator (m); none given: 1.
+    pub input_gain: Vec<f64>,
+    /// Samples by which every reading is late.
+    pub sensor_delay: usize,
+    /// Loads that come and go while the scenario plays.
+    pub loads: Vec<Load>,
+    /// Faults of actuators while the scenario plays; `sensor` counts inputs from 0, and an actuator
+    /// that drops out gives zero.
+    pub actuator_faults: Vec<FaultEvent>,
+    /// Samples by which the scenario's mode is told late.
+    pub mode_delay: u64,
+    /// Times at which another mode is told.
+    pub told: Vec<Told>,
+}
+
+/// A constant that is added somewhere during `[from, until)` seconds.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Load {
+    /// Where.
+    pub at: Port,
+    /// First instant in seconds.
+    pub from: f64,
+    /// End in seconds.
+    pub until: f64,
+    /// In the units of the signal; of a state per sample.
+    pub size: f64,
+}
+
+/// Where a load acts, counted from 0.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Port {
+    /// On an input, behind its actuator.
+    Input(usize),
+    /// On a disturbance, so through `E` and `F`.
+    Disturbance(usize),
+    /// On a state, in every sample.
+    State(usize),
+}
+
+/// A mode (0-based) that is told during `[from, until)` seconds, whichever is active.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Told {
+    /// First instant in seconds.
+    pub from: f64,
+    /// End in seconds.
+    pub until: f64,
+    /// What is told.
+    pub mode: usize,
+}
+
+/// Whether `tick` lies in `[from, until)` seconds.
+fn is_within(tick: u64, from: f64, until: f64, sample_time: f64) -> bool {
+    (first_tick(from, sample_time)..first_tick(until, sample_time)).contains(&tick)
+}
+
+impl Load {
+    /// Whether it acts at `tick`.
+    pub fn active(&self, tick: u64, sample_time: f64) -> bool {
+        is_within(tick, self.from, self.until, sample_time)
+    }
+}
+
+impl Told {
+    /// Whether it is told at `tick`.
+    pub fn active(&self, tick: u64, sample_time: f64) -> bool {
+        is_within(tick, self.from, self.until, sample_time)
+    }
+}
+
+/// The longest delay of the sensors in samples.
+pub const LONGEST_DELAY: usize = 1000;
+
+impl Deviation {
+    /// Whether every index and size fits a plant of `modes` modes.
+    ///
+    /// # Errors
+    /// One sentence that says what does not fit.
+    pub fn check(&self, plant: &SwitchedPlant) -> Result<(), String> {
+        let dims = plant.dimensions();
+        if !self.input_gain.is_empty() && self.input_gain.len() != dims.inputs {
+            return Err(format!(
+                "the true plant has {} input gains, but the plant has {} inputs",
+                self.input_gain.len(),
+                dims.inputs
+            ));
+        }
+        let misplaced = self.loads.iter().find(|load| match load.at {
+            Port::Input(at) => at >= dims.inputs,
+            Port::Disturbance(at) => at >= dims.disturbances,
+            Port::State(at) => at >= dims.states,
+        });
+        if let Some(load) = misplaced {
+            return Err(format!(
+                "a load acts on {}, which the plant does not have",
+                load.at
+            ));
+        }
+        if self
+            .actuator_faults
+            .iter()
+            .any(|fault| fault.sensor >= dims.inputs)
+        {
+            return Err("an actuator fault names an input that the plant does not have".into());
+        }
+        if self.told.iter().any(|told| told.mode >= plant.modes.len()) {
+            return Err("a mode is told that the plant does not have".into());
+        }
+        if self.sensor_delay > LONGEST_DELAY {
+            return Err(format!(
+                "the sensors are {} samples late: give at most {LONGEST_DELAY}",
+                self.sensor_delay
+            ));
+        }
+        Ok(())
+    }
+}
+
+impl fmt::Display for Port {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Input(at) => write!(f, "input {}", at + 1),
+            Self::Disturbance(at) => write!(f, "disturbance {}", at + 1),
+            Self::State(at) => write!(f, "state {}", at + 1),
+        }
+    }
+}
+
+impl SwitchedPlant {
+    /// This plant with every entry of `A`, `B` and `E` multiplied by `1 + error r`, where `r` is drawn
+    /// uniformly from -1 to 1: the same for the same `seed`.
+    pub fn perturbed(&self, error: f64, seed: u64) -> Self {
+        let mut generator = ChaCha8Rng::seed_from_u64(seed);
+        let mut uniform =
+            || 2.0 * ((generator.next_u64() >> 11) as f64 / (1u64 << 53) as f64) - 1.0;
+        let mut off = |matrix: &DMatrix<f64>| matrix.map(|entry| entry * (1.0 + error * uniform()));
+        let modes = self
+            .modes
+            .iter()
+            .map(|mode| Mode {
+                a: off(&mode.a),
+                b: off(&mode.b),
+                e: off(&mode.e),
+                ..mode.clone()
+            })
+            .collect();
+        Self {
+            sample_time: self.sample_time,
+            modes,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::OperatingPoint;
+    use nalgebra::dmatrix;
+
+    fn plant() -> SwitchedPlant {
+        SwitchedPlant {
+            sample_time: 0.5,
+            modes: vec![Mode {
+                name: "only".into(),
+                a: dmatrix![0.5, 0.0; 0.2, 0.4],
+                b: dmatrix![1.0; 2.0],
+                c: dmatrix![1.0, 0.0],
+                e: dmatrix![1.0; 0.0],
+                f: dmatrix![0.0],
+                operating_point: OperatingPoint::zero(2, 1, 1),
+            }],
+        }
+    }
+
+    #[test]
+    fn entries_are_off_by_at_most_the_error_and_zeros_stay() {
+        let (nominal, off) = (plant(), plant().perturbed(0.1, 3));
+        assert_eq!(off, plant().perturbed(0.1, 3));
+        assert_ne!(off, plant().perturbed(0.1, 4));
+        let (old, new) = (&nominal.modes[0], &off.modes[0]);
+        for (old, new) in [(&old.a, &new.a), (&old.b, &new.b), (&old.e, &new.e)] {
+            for (old, new) in old.iter().zip(new.iter()) {
+                assert!((new - old).abs() <= 0.1 * old.abs());
+            }
+        }
+        assert_eq!((&new.c, old.a[(0, 1)]), (&old.c, 0.0));
+    }
+
+    #[test]
+    fn what_does_not_fit_the_plant_is_refused() {
+        let load = |at| Deviation {
+            loads: vec![Load {
+                at,
+                from: 0.0,
+                until: 1.0,
+                size: 1.0,
+            }],
+            ..Deviation::default()
+        };
+        assert!(load(Port::State(1)).check(&plant()).is_ok());
+        let message = load(Port::State(2)).check(&plant()).unwrap_err();
+        assert!(message.contains("state 3"), "{message}");
+        assert!(load(Port::Input(1)).check(&plant()).is_err());
+        assert!(load(Port::Disturbance(1)).check(&plant()).is_err());
+        let gains = Deviation {
+            input_gain: vec![1.0; 2],
+            ..Deviation::default()
+        };
+        assert!(gains.check(&plant()).is_err());
+        let told = Deviation {
+            told: vec![Told {
+                from: 0.0,
+                until: 1.0,
+                mode: 1,
+            }],
+            ..Deviation::default()
+        };
+        assert!(told.check(&plant()).is_err());
+    }
+}

@@ -1,0 +1,185 @@
+//! What the true plant's departures do from tick to tick: actuators, loads, late readings, a mode
+//! that is told late or wrong.
+
+use super::{External, PlantSimulator, PlantState};
+use ftc_control::kernel;
+use ftc_plant::deviation::{Load, Port};
+use ftc_plant::scenario::FaultKind;
+use ftc_plant::{Deviation, OperatingPoint};
+use serde::{Deserialize, Serialize};
+
+/// What the departures carry from one tick to the next.
+#[derive(Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Departed {
+    /// The input behind the actuators (m).
+    pub(super) applied: Vec<f64>,
+    /// Its change (m).
+    pub(super) change: Vec<f64>,
+    /// What each actuator gave last outside any fault (m).
+    held: Vec<f64>,
+    /// True outputs that are on their way to the sensors, the oldest first (p times the delay).
+    late: Vec<f64>,
+    /// Last readings outside any injected fault (p).
+    pub(super) reading: Vec<f64>,
+    /// Scratch for injected noise (p).
+    pub(super) draws: Vec<f64>,
+    /// Whether the scenario plays.
+    pub(super) plays: bool,
+}
+
+ftc_control::state!(Departed {
+    parts: [applied, change, held, late, reading, draws],
+    constants: [],
+    counters: [plays]
+});
+
+impl Departed {
+    /// At rest at an operating point.
+    pub(super) fn new(point: &OperatingPoint, deviation: &Deviation) -> Self {
+        Self {
+            applied: point.u.clone(),
+            change: vec![0.0; point.u.len()],
+            held: point.u.clone(),
+            late: point.y.repeat(deviation.sensor_delay),
+            reading: point.y.clone(),
+            draws: vec![0.0; point.y.len()],
+            plays: true,
+        }
+    }
+
+    /// The outputs that the sensors read now (p), where the true ones are `y_true` (p).
+    pub(super) fn seen<'a>(&'a self, y_true: &'a [f64]) -> &'a [f64] {
+        match self.late.get(..y_true.len()) {
+            Some(late) if !late.is_empty() => late,
+            _ => y_true,
+        }
+    }
+
+    /// Whether readings are late.
+    pub(super) fn is_late(&self) -> bool {
+        !self.late.is_empty()
+    }
+
+    /// Sends the true outputs of this tick (p) to the sensors.
+    pub(super) fn read(&mut self, y_true: &[f64]) {
+        let Some(kept) = self.late.len().checked_sub(y_true.len()) else {
+            return;
+        };
+        self.late.copy_within(y_true.len().., 0);
+        if let Some(newest) = self.late.get_mut(kept..) {
+            kernel::copy(newest, y_true);
+        }
+    }
+}
+
+impl PlantSimulator {
+    /// The mode that is told while `mode` is active.
+    pub(super) fn told_mode(&self, external: &External<'_>, mode: usize, tick: u64) -> usize {
+        if external.mode.is_some() {
+            return mode;
+        }
+        let (te, deviation) = (self.plant.sample_time, &self.deviation);
+        let wrong = deviation.told.iter().find(|told| told.active(tick, te));
+        let told = match wrong {
+            Some(told) => told.mode,
+            None if deviation.mode_delay == 0 => mode,
+            None => self
+                .scenario
+                .mode(tick.saturating_sub(deviation.mode_delay), te),
+        };
+        told.min(self.plant.modes.len().saturating_sub(1))
+    }
+
+    /// What the actuators make of the command `u` (m).
+    pub(super) fn actuate(&self, state: &mut PlantState, u: &[f64]) {
+        let (tick, te) = (state.tick, self.plant.sample_time);
+        let departed = &mut state.departed;
+        kernel::copy(&mut departed.applied, u);
+        for (value, gain) in departed.applied.iter_mut().zip(&self.deviation.input_gain) {
+            *value *= gain;
+        }
+        if !departed.plays || !self.moves_inputs() {
+            return;
+        }
+        for (input, (value, held)) in departed
+            .applied
+            .iter_mut()
+            .zip(&mut departed.held)
+            .enumerate()
+        {
+            let faults = self.deviation.actuator_faults.iter();
+            let mut struck = false;
+            for fault in faults.filter(|fault| fault.sensor == input && fault.active(tick, te)) {
+                struck = true;
+                *value = match fault.kind {
+                    FaultKind::Dropout => 0.0,
+                    _ => fault.reading(*value, *held, tick, te),
+                };
+            }
+            if !struck {
+                *held = *value;
+            }
+            *value += self.load(Port::Input(input), tick);
+        }
+        kernel::bound(&mut departed.applied);
+    }
+
+    /// Whether anything acts on inputs while the scenario plays.
+    fn moves_inputs(&self) -> bool {
+        !(self.deviation.actuator_faults.is_empty() && self.deviation.loads.is_empty())
+    }
+
+    /// What the actuators make of a small change of the command (m): leaves it in the scratch.
+    pub(super) fn actuate_change(&self, state: &mut PlantState, change: &[f64]) {
+        let (tick, te) = (state.tick, self.plant.sample_time);
+        let departed = &mut state.departed;
+        kernel::copy(&mut departed.change, change);
+        for (value, gain) in departed.change.iter_mut().zip(&self.deviation.input_gain) {
+            *value *= gain;
+        }
+        if !departed.plays {
+            return;
+        }
+        for fault in &self.deviation.actuator_faults {
+            if let Some(value) = departed.change.get_mut(fault.sensor)
+                && fault.active(tick, te)
+            {
+                match fault.kind {
+                    FaultKind::GainLoss { loss } => *value *= 1.0 - loss,
+                    FaultKind::Stuck | FaultKind::Dropout => *value = 0.0,
+                    FaultKind::Bias { .. }
+                    | FaultKind::Drift { .. }
+                    | FaultKind::Intermittent { .. } => {}
+                }
+            }
+        }
+    }
+
+    /// The sum of the loads at `port`.
+    fn load(&self, port: Port, tick: u64) -> f64 {
+        let te = self.plant.sample_time;
+        let here = |load: &&Load| load.at == port && load.active(tick, te);
+        let loads = self.deviation.loads.iter().filter(here);
+        loads.map(|load| load.size).sum()
+    }
+
+    /// Adds loads to the disturbance.
+    pub(super) fn load_disturbance(&self, state: &mut PlantState) {
+        if self.deviation.loads.is_empty() || !state.departed.plays {
+            return;
+        }
+        for (channel, value) in state.disturbance.iter_mut().enumerate() {
+            *value += self.load(Port::Disturbance(channel), state.tick);
+        }
+    }
+
+    /// Adds loads to the state.
+    pub(super) fn load_state(&self, state: &mut PlantState) {
+        if self.deviation.loads.is_empty() || !state.departed.plays {
+            return;
+        }
+        for (index, value) in state.x.iter_mut().enumerate() {
+            *value += self.load(Port::State(index), state.tick);
+        }
+    }
+}

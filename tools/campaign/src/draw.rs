@@ -1,0 +1,252 @@
+//! What happens in one run: a pure function of the design, the options and the number of the run.
+
+use crate::Options;
+use ftc_design::Design;
+use ftc_plant::scenario::{FaultEvent, FaultKind, ModeInterval, Scenario, Waveform};
+use ftc_plant::{Mode, SwitchedPlant, TruePlant};
+use nalgebra::DMatrix;
+use rand_chacha::ChaCha8Rng;
+use rand_chacha::rand_core::{Rng, SeedableRng};
+
+/// Share of a run after which the first and before which the last fault begins.
+const ONSET: [f64; 2] = [0.1, 0.8];
+/// Shortest and longest fault, as a share of the run.
+const DURATION: [f64; 2] = [0.05, 0.5];
+/// Noise, relative to the scenario's.
+const NOISE: [f64; 2] = [0.5, 2.0];
+/// Share of a reading that is lost.
+const LOSS: [f64; 2] = [0.05, 0.9];
+/// Period of an intermittent fault in samples.
+const PERIOD: [f64; 2] = [4.0, 80.0];
+/// The most levels of a reference, and the most switches between modes.
+const MOST_LEVELS: u64 = 5;
+const MOST_SWITCHES: u64 = 4;
+/// How long a mode lasts at least, as a share of the run, where the scenario does not switch.
+const SHORTEST_MODE: f64 = 0.1;
+
+/// What happens in one run.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Drawn {
+    /// The experiment.
+    pub scenario: Scenario,
+    /// The true plant.
+    pub truth: TruePlant,
+    /// Largest relative error of an entry of `A`, `B` or `E`.
+    pub model_error: f64,
+    /// Noise, relative to the design's scenario.
+    pub noise: f64,
+}
+
+/// Uniform numbers from the stream of one run.
+struct Draws(ChaCha8Rng);
+
+impl Draws {
+    fn new(seed: u64, run: u64) -> Self {
+        let mut generator = ChaCha8Rng::seed_from_u64(seed);
+        generator.set_stream(run);
+        Self(generator)
+    }
+
+    /// In `[0, 1)`.
+    fn share(&mut self) -> f64 {
+        (self.0.next_u64() >> 11) as f64 / (1u64 << 53) as f64
+    }
+
+    fn between(&mut self, [low, high]: [f64; 2]) -> f64 {
+        low + (high - low) * self.share()
+    }
+
+    /// Equally likely in each ratio.
+    fn ratio(&mut self, [low, high]: [f64; 2]) -> f64 {
+        low * libm::exp(self.share() * libm::log(high / low))
+    }
+
+    /// A whole number below `count`.
+    fn below(&mut self, count: u64) -> u64 {
+        (self.share() * count as f64) as u64
+    }
+
+    fn sign(&mut self) -> f64 {
+        if self.share() < 0.5 { -1.0 } else { 1.0 }
+    }
+}
+
+/// What happens in run number `run`.
+pub fn draw(design: &Design, options: &Options, run: u64) -> Drawn {
+    let mut draws = Draws::new(options.seed, run);
+    let base = &design.scenario;
+    let schedule = schedule(design, &mut draws);
+    let reference = (0..base.reference.len())
+        .map(|index| reference(design, index, &mut draws))
+        .collect();
+    let disturbance = base
+        .disturbance
+        .iter()
+        .map(|signal| disturbance(signal, &mut draws))
+        .collect();
+    let noise = draws.ratio(NOISE);
+    let model_error = draws.share() * options.model_error;
+    let truth = truth(design, model_error, &mut draws);
+    let faults = draws.below(u64::from(options.most_faults) + 1);
+    let events = (0..faults)
+        .map(|_| fault(design, options, &mut draws))
+        .collect();
+    Drawn {
+        scenario: Scenario {
+            steps: base.steps,
+            noise: base
+                .noise
+                .iter()
+                .map(|deviation| noise * deviation)
+                .collect(),
+            seed: draws.0.next_u64(),
+            schedule,
+            reference,
+            fault: vec![Waveform::ZERO; base.fault.len()],
+            events,
+            disturbance,
+        },
+        truth,
+        model_error,
+        noise,
+    }
+}
+
+/// Length of a run in seconds.
+fn length(design: &Design) -> f64 {
+    design.scenario.steps as f64 * design.plant.sample_time
+}
+
+/// Random modes, each for at least as long as the shortest in the design's own schedule.
+fn schedule(design: &Design, draws: &mut Draws) -> Vec<ModeInterval> {
+    let modes = design.plant.modes.len() as u64;
+    let whole = length(design);
+    let own = design.scenario.schedule.windows(2);
+    let shortest = own
+        .map(|pair| pair[1].from - pair[0].from)
+        .fold(f64::INFINITY, f64::min);
+    let shortest = match shortest.is_finite() {
+        true => shortest.min(whole / 2.0),
+        false => SHORTEST_MODE * whole,
+    };
+    let mut schedule = vec![ModeInterval {
+        from: 0.0,
+        mode: draws.below(modes) as usize,
+    }];
+    let switches = if modes > 1 {
+        draws.below(MOST_SWITCHES + 1)
+    } else {
+        0
+    };
+    let mut now = 0.0;
+    for _ in 0..switches {
+        now += shortest * (1.0 + draws.share());
+        let step = 1 + draws.below(modes - 1);
+        if now < whole {
+            let last = schedule.last().map_or(0, |interval| interval.mode) as u64;
+            schedule.push(ModeInterval {
+                from: now,
+                mode: ((last + step) % modes) as usize,
+            });
+        }
+    }
+    schedule
+}
+
+/// Random levels within what the scenario asks of this output, at random times.
+fn reference(design: &Design, index: usize, draws: &mut Draws) -> Waveform {
+    let te = design.plant.sample_time;
+    let signal = &design.scenario.reference[index];
+    let levels = (0..design.scenario.steps).map(|tick| signal.at(tick, te));
+    let [low, high] = levels.fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], value| {
+        [low.min(value), high.max(value)]
+    });
+    let whole = length(design);
+    let count = 1 + draws.below(MOST_LEVELS);
+    let points = (0..count)
+        .map(|level| {
+            let share =
+                (level as f64 + if level == 0 { 0.0 } else { draws.share() }) / count as f64;
+            [share * whole, draws.between([low, high])]
+        })
+        .collect();
+    Waveform::Steps { points }
+}
+
+/// A sine of the scenario with another phase and amplitude; any other signal as it is.
+fn disturbance(signal: &Waveform, draws: &mut Draws) -> Waveform {
+    match signal {
+        Waveform::Sine {
+            amplitude,
+            period,
+            offset,
+            ..
+        } => Waveform::Sine {
+            amplitude: amplitude * draws.share(),
+            period: *period,
+            phase: core::f64::consts::TAU * draws.share(),
+            offset: *offset,
+        },
+        other => other.clone(),
+    }
+}
+
+/// Every entry of `A`, `B` and `E` off by a random part of `error`; a nonlinear plant stays what it is.
+fn truth(design: &Design, error: f64, draws: &mut Draws) -> TruePlant {
+    let nominal = match &design.true_plant {
+        TruePlant::AsDesigned => &design.plant,
+        TruePlant::Linear { plant } => plant,
+        other => return other.clone(),
+    };
+    let mut off = |matrix: &DMatrix<f64>| {
+        matrix.map(|entry| entry * (1.0 + error * draws.between([-1.0, 1.0])))
+    };
+    let modes = nominal
+        .modes
+        .iter()
+        .map(|mode| Mode {
+            a: off(&mode.a),
+            b: off(&mode.b),
+            e: off(&mode.e),
+            ..mode.clone()
+        })
+        .collect();
+    TruePlant::Linear {
+        plant: SwitchedPlant {
+            sample_time: nominal.sample_time,
+            modes,
+        },
+    }
+}
+
+fn fault(design: &Design, options: &Options, draws: &mut Draws) -> FaultEvent {
+    let (whole, te) = (length(design), design.plant.sample_time);
+    let sensors = design.signals.outputs.len() as u64;
+    let sensor = draws.below(sensors) as usize;
+    let from = whole * draws.between(ONSET);
+    let duration = whole * draws.ratio(DURATION);
+    let threshold = design.controller.estimator.thresholds.get(sensor);
+    let size = draws.sign() * draws.ratio([1.0, options.largest_fault.max(1.0 + 1e-9)]);
+    let size = size * threshold.copied().unwrap_or(1.0);
+    let kind = match draws.below(6) {
+        0 => FaultKind::Bias { size },
+        1 => FaultKind::Drift {
+            slope: size / duration,
+        },
+        2 => FaultKind::GainLoss {
+            loss: draws.between(LOSS),
+        },
+        3 => FaultKind::Stuck,
+        4 => FaultKind::Intermittent {
+            size,
+            period: te * draws.ratio(PERIOD),
+        },
+        _ => FaultKind::Dropout,
+    };
+    FaultEvent {
+        sensor,
+        from,
+        until: from + duration,
+        kind,
+    }
+}

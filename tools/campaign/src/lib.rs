@@ -1,0 +1,151 @@
+//! A campaign: thousands of seeded random runs of one design, each with other faults, schedules,
+//! references, disturbances, noise and model error; each with fault tolerance, without, and told the
+//! fault.
+//!
+//! Run `i` depends on the design, the [`Options`] and `i` alone, and statistics are integer counts.
+//! So any range of runs can be done anywhere ([`run_shard`]), in any number of threads, and
+//! [`merge`] gives the same [`Partial`] to the last digit, whatever the order; runs that two parts
+//! share are refused rather than counted twice.
+
+mod draw;
+mod histogram;
+pub mod page;
+mod partial;
+pub mod rows;
+mod run;
+mod statistics;
+
+pub use draw::{Drawn, draw};
+pub use histogram::Histogram;
+pub use partial::{MergeError, Partial, merge};
+pub use run::{Outcome, Struck, run_one};
+pub use statistics::{KindStatistics, Statistics, Worst};
+
+use ftc_control::Controller;
+use ftc_design::Design;
+use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
+use std::ops::Range;
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+
+/// Runs that are worked on together; what is kept in memory is bounded by it.
+const BATCH: u64 = 256;
+
+/// What is drawn in each run.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default)]
+#[non_exhaustive]
+pub struct Options {
+    /// Seed of the campaign.
+    pub seed: u64,
+    /// Largest relative error of the entries of `A`, `B` and `E`.
+    pub model_error: f64,
+    /// Largest fault, in thresholds of its sensor.
+    pub largest_fault: f64,
+    /// The most faults in one run.
+    pub most_faults: u32,
+}
+
+impl Default for Options {
+    fn default() -> Self {
+        Self {
+            seed: 1,
+            model_error: 0.02,
+            largest_fault: 30.0,
+            most_faults: 2,
+        }
+    }
+}
+
+impl Options {
+    /// These options with another seed.
+    pub fn with_seed(self, seed: u64) -> Self {
+        Self { seed, ..self }
+    }
+
+    /// Says in one sentence what is out of range.
+    ///
+    /// # Errors
+    /// The name of the option and what to give.
+    pub fn check(&self) -> Result<(), String> {
+        if !(0.0..=1.0).contains(&self.model_error) {
+            return Err(format!(
+                "model error is {}: give a fraction from 0 to 1",
+                self.model_error
+            ));
+        }
+        if !(1.0..=1e6).contains(&self.largest_fault) {
+            return Err(format!(
+                "largest fault is {}: give 1 to 1e6 thresholds",
+                self.largest_fault
+            ));
+        }
+        if self.most_faults > 16 {
+            return Err(format!(
+                "most faults is {}: give at most 16",
+                self.most_faults
+            ));
+        }
+        Ok(())
+    }
+}
+
+/// How a shard is watched and stopped.
+#[derive(Debug, Default)]
+pub struct Watch {
+    /// Set it to stop: runs that are done are kept.
+    pub stop: AtomicBool,
+    /// Counts the runs that are done.
+    pub done: AtomicU64,
+}
+
+/// Does the runs of `range` in the present pool of threads.
+pub fn run_shard(design: &Design, options: &Options, range: Range<u64>) -> Partial {
+    let kept = run_watched(design, options, range, &Watch::default(), |_| {
+        Ok::<(), ()>(())
+    });
+    kept.unwrap_or_else(|()| Partial::new(design, options))
+}
+
+/// As [`run_shard`]: can be stopped, and hands the outcomes of each batch over, in the order of the
+/// runs.
+///
+/// # Errors
+/// What `keep` says.
+pub fn run_watched<E>(
+    design: &Design,
+    options: &Options,
+    range: Range<u64>,
+    watch: &Watch,
+    mut keep: impl FnMut(&[Outcome]) -> Result<(), E>,
+) -> Result<Partial, E> {
+    let controller =
+        Controller::new(design.parameters()).expect("a finished design has matching sizes");
+    let mut partial = Partial::new(design, options);
+    let mut first = range.start;
+    while first < range.end && !watch.stop.load(Ordering::Relaxed) {
+        let last = range.end.min(first + BATCH);
+        let outcomes: Vec<Option<Outcome>> = (first..last)
+            .into_par_iter()
+            .map(|run| {
+                if watch.stop.load(Ordering::Relaxed) {
+                    return None;
+                }
+                let outcome = run_one(design, &controller, options, run);
+                watch.done.fetch_add(1, Ordering::Relaxed);
+                Some(outcome)
+            })
+            .collect();
+        let outcomes: Vec<Outcome> = outcomes.into_iter().map_while(|outcome| outcome).collect();
+        keep(&outcomes)?;
+        partial.add(&outcomes);
+        first = last;
+    }
+    Ok(partial)
+}
+
+/// The runs of shard `index` (from 1) of `count`, out of `runs`.
+pub fn shard(runs: u64, index: u64, count: u64) -> Range<u64> {
+    let end = |i: u64| (u128::from(runs) * u128::from(i) / u128::from(count.max(1))) as u64;
+    end(index.saturating_sub(1))..end(index)
+}

@@ -1,0 +1,32 @@
+#!/usr/bin/env bash
+# Tries the wheel of dist/ in a fresh virtual environment in which no Rust can be found: its own tests,
+# README's example, every example of examples/python, and the tests of tests/ on the program it brings.
+set -euo pipefail
+cd "$(dirname "$0")/../.."
+
+folder=$1
+environment=$folder/environment
+rm -rf "$folder"
+mkdir -p "$folder"
+"${PYTHON:-python3}" -m venv "$environment"
+wheel=$(ls -t dist/ftc_fmu-*manylinux*x86_64.whl | head -1)
+"$environment/bin/pip" install --quiet --disable-pip-version-check "${wheel}[all]" --constraint tests/requirements.txt \
+    --requirement tests/requirements.txt
+
+# No cargo, no rustc: what is tested is what a user has.
+PATH=$PWD/$environment/bin:/usr/local/bin:/usr/bin:/bin
+unset PYTHONPATH
+for program in cargo rustc; do
+    if command -v "$program"; then
+        echo "$program can be found: the test would prove nothing" >&2
+        exit 1
+    fi
+done
+
+python -m pytest -c tools/python/pytest.ini --rootdir tools/python
+python tools/python/readme.py README.md "$folder/readme"
+for example in quadruple_tank dc_motor boost_converter; do
+    python "examples/python/$example.py" --out "$folder/$example"
+done
+python examples/python/from_a_log.py --out "$folder/from_a_log"
+FTC_FMU=$PWD/$environment/bin/ftc-fmu python -m pytest tests

@@ -1,0 +1,246 @@
+//! The same scenario on plants that are not quite the model's: with fault tolerance and without.
+
+use crate::page::{Block, Column, Row, Section, Table};
+use crate::text::significant;
+use ftc_control::Controller;
+use ftc_design::Design;
+use ftc_plant::deviation::{Load, Port};
+use ftc_plant::{Deviation, TruePlant};
+use ftc_simulate::closed_loop::visit;
+use ftc_simulate::{PlantSimulator, Variant};
+use serde_json::{Value, json};
+use std::fmt::Write;
+
+/// By how much every actuator is too strong or too weak.
+const GAIN: f64 = 0.1;
+/// Height of a step on an input, relative to its nominal value.
+const STEP: f64 = 0.1;
+/// Fault tolerance does worse than none where its true error is larger by more than this share.
+const WORSE: f64 = 0.01;
+/// Errors (root mean square, relative to the nominal value of the output) below this one do not matter.
+const NEGLIGIBLE: f64 = 1e-3;
+
+/// One case and what came of it.
+pub struct Case {
+    /// What differs from the scenario, in words.
+    pub name: String,
+    /// True mean square error per tracked output with fault tolerance.
+    pub with: Vec<f64>,
+    /// The same without.
+    pub without: Vec<f64>,
+}
+
+/// Tries the scenario as it is, actuators that are too strong and too weak, a step on each input and
+/// each disturbance in the middle of the scenario, and readings that are one sample later.
+pub fn cases(design: &Design) -> Vec<Case> {
+    let controller =
+        Controller::new(design.parameters()).expect("a finished design has matching sizes");
+    departures(design)
+        .into_iter()
+        .map(|(name, deviation)| {
+            let truth = design.true_plant.clone().with_deviation(deviation);
+            let errors = |variant| errors(design, &controller, truth.clone(), variant);
+            Case {
+                name,
+                with: errors(Variant::Ftc),
+                without: errors(Variant::NoFtc),
+            }
+        })
+        .collect()
+}
+
+/// What is tried, on top of what departs anyway.
+fn departures(design: &Design) -> Vec<(String, Deviation)> {
+    let (_, own) = design.true_plant.clone().into_parts();
+    let dims = design.plant.dimensions();
+    let mut all = vec![("the scenario as it is".to_string(), own.clone())];
+    for (name, change) in [("10 % too strong", GAIN), ("10 % too weak", -GAIN)] {
+        let mut deviation = own.clone();
+        deviation.input_gain.resize(dims.inputs, 1.0);
+        for gain in &mut deviation.input_gain {
+            *gain *= 1.0 + change;
+        }
+        all.push((format!("every actuator {name}"), deviation));
+    }
+    let middle = (design.scenario.steps / 2) as f64 * design.plant.sample_time;
+    let mut step = |name: String, at: Port, size: f64| {
+        let mut deviation = own.clone();
+        deviation.loads.push(Load {
+            at,
+            from: middle,
+            until: f64::MAX,
+            size,
+        });
+        all.push((name, deviation));
+    };
+    for (index, input) in design.signals.inputs.iter().enumerate() {
+        let size = STEP * input.nominal;
+        let name = format!("a step of {} on {}", significant(size), input.name);
+        step(name, Port::Input(index), size);
+    }
+    for channel in 0..dims.disturbances {
+        let size = height(design, channel);
+        let name = format!(
+            "a step of {} on disturbance {}",
+            significant(size),
+            channel + 1
+        );
+        step(name, Port::Disturbance(channel), size);
+    }
+    let mut late = own;
+    late.sensor_delay += 1;
+    all.push(("readings one sample later".into(), late));
+    all
+}
+
+/// The largest value of a disturbance in the scenario, or one.
+fn height(design: &Design, channel: usize) -> f64 {
+    let te = design.plant.sample_time;
+    let signal = &design.scenario.disturbance[channel];
+    let values = (0..design.scenario.steps).map(|tick| signal.at(tick, te).abs());
+    let largest = values.fold(0.0, f64::max);
+    if largest > 0.0 { largest } else { 1.0 }
+}
+
+/// True mean square error per tracked output; infinite where the plant could not be integrated.
+fn errors(
+    design: &Design,
+    controller: &Controller,
+    truth: TruePlant,
+    variant: Variant,
+) -> Vec<f64> {
+    let plant =
+        PlantSimulator::with_true_plant(design.plant.clone(), truth, design.scenario.clone());
+    let tracked = &design.controller.feedback.tracked;
+    let mut squares = vec![0.0; tracked.len()];
+    let stalled = visit(&plant, controller, variant, |seen| {
+        let outputs = tracked.iter().zip(&seen.plant.reference);
+        for (sum, (&row, reference)) in squares.iter_mut().zip(outputs) {
+            let error = seen.plant.y_true[row] - reference;
+            *sum += error * error;
+        }
+    });
+    for sum in &mut squares {
+        *sum = match stalled {
+            None => *sum / design.scenario.steps.max(1) as f64,
+            Some(_) => f64::INFINITY,
+        };
+    }
+    squares
+}
+
+/// Whether a true mean square error with fault tolerance is worth a word beside the one without.
+fn is_worse(with: f64, without: f64, nominal: f64) -> bool {
+    with.sqrt() > NEGLIGIBLE * nominal && with > (1.0 + WORSE) * without
+}
+
+/// A sentence for every case and output in which fault tolerance does worse than none.
+pub fn warnings(design: &Design, cases: &[Case]) -> Vec<String> {
+    let tracked = &design.controller.feedback.tracked;
+    let worse = cases.iter().flat_map(|case| {
+        let outputs = tracked.iter().zip(case.with.iter().zip(&case.without));
+        outputs.filter_map(|(&row, (&with, &without))| {
+            let output = &design.signals.outputs[row];
+            is_worse(with, without, output.nominal).then(|| {
+                format!(
+                    "{}: {} follows its reference worse with fault tolerance than without (true MSE {with:.3e} against \
+                     {without:.3e}): raise estimator.sigmas or threshold, or see whether its faults are worth detecting",
+                    case.name, output.name
+                )
+            })
+        })
+    });
+    worse.collect()
+}
+
+/// The section of the page.
+pub fn section(design: &Design, cases: &[Case]) -> Section {
+    let tracked = &design.controller.feedback.tracked;
+    let mut rows = Vec::new();
+    for case in cases {
+        for (index, &row) in tracked.iter().enumerate() {
+            let (with, without) = (case.with[index], case.without[index]);
+            rows.push(Row {
+                cells: vec![
+                    case.name.clone(),
+                    design.signals.outputs[row].name.clone(),
+                    format!("{with:.3e}"),
+                    format!("{without:.3e}"),
+                    match with > (1.0 + WORSE) * without {
+                        true => "worse".into(),
+                        false => significant((without / with).sqrt()),
+                    },
+                ],
+                begins_group: index == 0,
+                ..Row::default()
+            });
+        }
+    }
+    Section::new("On a plant that is not quite the model").with(Block::Table(Table {
+        caption: "True mean square error with fault tolerance and without".into(),
+        columns: vec![
+            Column::words("case"),
+            Column::name("output"),
+            Column::number("with"),
+            Column::number("without"),
+            Column::number("error smaller by"),
+        ],
+        rows,
+        notes: vec![
+            "Steps last from the middle of the scenario to its end. The ratio is that of root mean squares.".into(),
+        ],
+    }))
+}
+
+/// The table for a person at a terminal.
+pub fn text(design: &Design, cases: &[Case]) -> String {
+    let tracked = &design.controller.feedback.tracked;
+    let mut text = format!(
+        "{:<44}{:<12}{:>14}{:>14}\n",
+        "true MSE on another plant", "output", "with FTC", "without"
+    );
+    for case in cases {
+        for (index, &row) in tracked.iter().enumerate() {
+            let name = if index == 0 { case.name.as_str() } else { "" };
+            let _ = writeln!(
+                text,
+                "{name:<44}{:<12}{:>14.5e}{:>14.5e}",
+                design.signals.outputs[row].name, case.with[index], case.without[index]
+            );
+        }
+    }
+    text.push('\n');
+    text
+}
+
+/// The same for a program.
+pub fn json(cases: &[Case]) -> Value {
+    let finite = |values: &[f64]| -> Vec<Option<f64>> {
+        let finite = values
+            .iter()
+            .map(|&value| Some(value).filter(|v| v.is_finite()));
+        finite.collect()
+    };
+    cases
+        .iter()
+        .map(|case| {
+            json!({
+                "case": case.name,
+                "mse": { "ftc": finite(&case.with), "no_ftc": finite(&case.without) },
+            })
+        })
+        .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::is_worse;
+
+    #[test]
+    fn worse_is_what_is_larger_and_matters() {
+        assert!(is_worse(0.02, 0.01, 1.0) && is_worse(f64::INFINITY, 1.0, 1.0));
+        assert!(!is_worse(0.01, 0.01, 1.0) && !is_worse(0.01, 0.02, 1.0));
+        assert!(!is_worse(1e-8, 1e-9, 1.0) && is_worse(1e-8, 1e-9, 1e-3));
+        assert!(!is_worse(0.010_05, 0.01, 1.0));
+    }
+}

@@ -1,0 +1,28 @@
+//! Files that engineers have, or one sentence: delimited text with or without time stamps
+//! ([`Table`], [`Clock`]), and matrices in MATLAB and NumPy files ([`matrices`]).
+//!
+//! Only regular files of bounded size are read. Every error is the end of a sentence that begins
+//! with the file's name.
+
+pub mod matrices;
+mod regular;
+mod resample;
+mod table;
+mod time;
+
+pub use regular::open_regular;
+pub use resample::{Interpolation, resample};
+pub use table::{MOST_ROWS, Place, Row, Table};
+pub use time::{Clock, TimeColumn, find_time_column};
+
+/// Longest quotation from the user's file.
+const QUOTATION: usize = 60;
+
+/// A quotation from the user's file: printable and short.
+pub(crate) fn quote(text: &str) -> String {
+    let clean: String = text.chars().filter(|c| !c.is_control()).collect();
+    match clean.char_indices().nth(QUOTATION) {
+        Some((cut, _)) => format!("'{}...'", &clean[..cut]),
+        None => format!("'{clean}'"),
+    }
+}

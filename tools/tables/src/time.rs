@@ -1,0 +1,311 @@
+//! The time column of a table: which one it is, what it says, and whether it keeps to a sample time.
+
+use crate::quote;
+use crate::table::{Place, Row, Table};
+use jiff::Timestamp;
+use jiff::civil::DateTime;
+use jiff::tz::TimeZone;
+
+/// Names of a time column, in any case and without a unit behind them.
+const NAMES: [&str; 8] = [
+    "t",
+    "time",
+    "timestamp",
+    "time stamp",
+    "time_stamp",
+    "datetime",
+    "date time",
+    "date/time",
+];
+
+/// Units behind the name, in seconds.
+const UNITS: [(&str, f64); 13] = [
+    ("s", 1.0),
+    ("sec", 1.0),
+    ("second", 1.0),
+    ("seconds", 1.0),
+    ("ms", 1e-3),
+    ("us", 1e-6),
+    ("\u{b5}s", 1e-6),
+    ("\u{3bc}s", 1e-6),
+    ("ns", 1e-9),
+    ("min", 60.0),
+    ("h", 3600.0),
+    ("hour", 3600.0),
+    ("hours", 3600.0),
+];
+
+/// How far one time step may be from the sample time, relative to it: clocks of loggers jitter.
+const JITTER: f64 = 0.05;
+/// How far a step may be off because times were rounded, in sample times: below half a sample, so that
+/// a row lost or doubled is always noticed.
+const ROUNDING: f64 = 0.499;
+/// How far the mean step may be from the sample time, relative to it: quartz clocks are a tenth of that.
+const DRIFT: f64 = 1e-3;
+
+/// The column that tells the time.
+#[derive(Clone, Debug, PartialEq)]
+pub struct TimeColumn {
+    /// Where it stands (0-based).
+    pub index: usize,
+    /// Its name.
+    pub name: String,
+    /// Seconds per unit of its numbers.
+    unit: f64,
+}
+
+/// A name without the unit behind it, in lower case, and the unit.
+fn split_unit(name: &str) -> (String, Option<String>) {
+    let lower = name.trim().to_lowercase();
+    for (open, close) in [('[', ']'), ('(', ')')] {
+        if let Some(inside) = lower.strip_suffix(close)
+            && let Some((base, unit)) = inside.rsplit_once(open)
+        {
+            return (base.trim().to_string(), Some(unit.trim().to_string()));
+        }
+    }
+    if let Some((base, unit)) = lower.rsplit_once([' ', '_', '/'])
+        && matches!(base.trim(), "t" | "time")
+        && UNITS.iter().any(|(known, _)| *known == unit)
+    {
+        return (base.trim().to_string(), Some(unit.to_string()));
+    }
+    (lower, None)
+}
+
+/// Whether a column is called as time columns are.
+fn looks_like_time(name: &str) -> bool {
+    let (base, _) = split_unit(name);
+    NAMES.contains(&base.as_str())
+}
+
+fn described(name: &str, index: usize) -> Result<TimeColumn, String> {
+    let unit = match split_unit(name).1 {
+        None => 1.0,
+        Some(unit) => UNITS
+            .iter()
+            .find(|(known, _)| *known == unit)
+            .map(|(_, seconds)| *seconds)
+            .ok_or_else(|| {
+                format!(
+                    "has the time column {} whose unit is not known: use s, ms, us, ns, min or h",
+                    quote(name)
+                )
+            })?,
+    };
+    Ok(TimeColumn {
+        index,
+        name: name.to_string(),
+        unit,
+    })
+}
+
+/// The time column: the one that is `said`, else the only one that bears a usual name; columns
+/// `taken` by signals are none.
+///
+/// # Errors
+/// The end of a sentence that begins with the file's name.
+pub fn find_time_column(
+    names: &[String],
+    said: Option<&str>,
+    taken: &[usize],
+) -> Result<Option<TimeColumn>, String> {
+    if let Some(said) = said {
+        let mut found = (0..names.len()).filter(|&at| names[at] == said);
+        return match (found.next(), found.next()) {
+            (Some(at), None) => described(said, at).map(Some),
+            (None, _) => Err(format!(
+                "has no column {}, which time = names: use one of {}",
+                quote(said),
+                names.join(", ")
+            )),
+            (Some(_), Some(_)) => Err(format!("has two columns {said}: keep one of them")),
+        };
+    }
+    let candidates: Vec<usize> = (0..names.len())
+        .filter(|at| !taken.contains(at) && looks_like_time(&names[*at]))
+        .collect();
+    match candidates[..] {
+        [] => Ok(None),
+        [one] => described(&names[one], one).map(Some),
+        [one, other, ..] => Err(format!(
+            "has two columns that may be the time, {} and {}: say which by time = \"...\"",
+            names[one], names[other]
+        )),
+    }
+}
+
+/// The times of a table, as they are read.
+#[derive(Clone, Debug)]
+pub struct Clock {
+    column: TimeColumn,
+    /// Seconds; of time stamps, since the first row.
+    times: Vec<f64>,
+    lines: Vec<u64>,
+    /// The first stamp in nanoseconds, where times are stamps.
+    origin: Option<i128>,
+    /// The finest step in which times are printed, in seconds.
+    resolution: f64,
+}
+
+impl Clock {
+    /// Nothing read yet.
+    pub fn new(column: TimeColumn) -> Self {
+        Self {
+            column,
+            times: Vec::new(),
+            lines: Vec::new(),
+            origin: None,
+            resolution: f64::INFINITY,
+        }
+    }
+
+    /// The times in seconds; time stamps count from the first.
+    pub fn times(&self) -> &[f64] {
+        &self.times
+    }
+
+    /// Takes the time of a row.
+    ///
+    /// # Errors
+    /// The end of a sentence that begins with the file's name.
+    pub fn read(&mut self, table: &mut Table, row: &Row) -> Result<(), String> {
+        let text = row.text(self.column.index);
+        let first = self.times.is_empty();
+        let number = table.parse(text).filter(|value| value.is_finite());
+        let time = match (number, stamp(text)) {
+            (Some(value), _) if first || self.origin.is_none() => {
+                table.agree_on_mark(row.place, text)?;
+                self.note_resolution(self.column.unit * printed_step(text));
+                value * self.column.unit
+            }
+            (None, Some(nanoseconds)) if first || self.origin.is_some() => {
+                let origin = *self.origin.get_or_insert(nanoseconds);
+                self.note_resolution(printed_step(text.rsplit(':').next().unwrap_or_default()));
+                (nanoseconds - origin) as f64 * 1e-9
+            }
+            _ => return Err(self.no_time(row.place, text)),
+        };
+        self.times.push(time);
+        self.lines.push(row.place.line);
+        Ok(())
+    }
+
+    fn note_resolution(&mut self, step: f64) {
+        self.resolution = self.resolution.min(step);
+    }
+
+    fn no_time(&self, place: Place, text: &str) -> String {
+        let found = match text.is_empty() {
+            true => "is empty".into(),
+            false => format!("holds {}", quote(text)),
+        };
+        let kind = match (self.times.is_empty(), self.origin) {
+            (true, _) => "numbers in seconds or ISO time stamps such as 2026-03-01T12:00:00.5",
+            (false, None) => "numbers throughout, as the first row has",
+            (false, Some(_)) => "ISO time stamps throughout, as the first row has",
+        };
+        format!("{place}, column {}, {found}: give {kind}", self.column.name)
+    }
+
+    fn place(&self, index: usize) -> Place {
+        Place {
+            row: index + 1,
+            line: self.lines[index],
+        }
+    }
+
+    /// Refuses gaps, doubled rows and a sampling rate that is not that of `sample_time` seconds.
+    ///
+    /// # Errors
+    /// The end of a sentence that begins with the file's name.
+    pub fn check_uniform(&self, sample_time: f64) -> Result<(), String> {
+        let rounding = (self.resolution / sample_time).min(ROUNDING);
+        let tolerance = JITTER.max(rounding) * (1.0 + 1e-9) + 1e-9;
+        let name = &self.column.name;
+        for (at, pair) in self.times.windows(2).enumerate() {
+            let &[before, now] = pair else { continue };
+            let place = self.place(at + 1);
+            if ((now - before) / sample_time - 1.0).abs() > tolerance {
+                return Err(format!(
+                    "{place}: {name} goes from {before} to {now}, but sample_time is {sample_time}: \
+                     record without gaps, one row per sample{}",
+                    self.coarse(sample_time)
+                ));
+            }
+            let samples = (at + 1) as f64;
+            let since = now - self.times[0];
+            let off = (since / sample_time - samples).abs();
+            if off > DRIFT * samples + 2.0 * tolerance {
+                return Err(format!(
+                    "{place}: {name} is {now}, {since} s after row 1, where {samples} samples of sample_time {sample_time} \
+                     make {} s; on average its rows are {:.6} s apart: set sample_time to that of the log, or resample the log",
+                    samples * sample_time,
+                    self.mean_step()
+                ));
+            }
+        }
+        Ok(())
+    }
+
+    /// The mean time between two rows.
+    fn mean_step(&self) -> f64 {
+        match (self.times.first(), self.times.last()) {
+            (Some(first), Some(last)) if self.times.len() > 1 => {
+                (last - first) / (self.times.len() - 1) as f64
+            }
+            _ => 0.0,
+        }
+    }
+
+    fn coarse(&self, sample_time: f64) -> String {
+        if self.resolution > 0.5 * sample_time {
+            format!(
+                "; its times are printed in steps of {} s, log more digits if that is why",
+                self.resolution
+            )
+        } else {
+            String::new()
+        }
+    }
+
+    /// Refuses times that do not ascend.
+    ///
+    /// # Errors
+    /// The end of a sentence that begins with the file's name.
+    pub fn check_ascending(&self) -> Result<(), String> {
+        let bad = self.times.windows(2).position(|pair| pair[1] <= pair[0]);
+        bad.map_or(Ok(()), |at| {
+            Err(format!(
+                "{}: {} goes from {} to {}: give the rows in ascending order of time, each time once",
+                self.place(at + 1),
+                self.column.name,
+                self.times[at],
+                self.times[at + 1]
+            ))
+        })
+    }
+}
+
+/// The step in which a number is printed: 0.01 for `7.25`, 1 for `7`.
+fn printed_step(text: &str) -> f64 {
+    let (mantissa, exponent) = text.split_once(['e', 'E']).unwrap_or((text, "0"));
+    let digits = mantissa
+        .split_once(['.', ','])
+        .map_or("", |(_, after)| after)
+        .chars()
+        .take_while(char::is_ascii_digit)
+        .count();
+    let exponent: i32 = exponent.parse().unwrap_or(0);
+    10f64.powi(exponent.saturating_sub(digits as i32).clamp(-300, 300))
+}
+
+/// An ISO time stamp in nanoseconds: an instant, or a local time without a zone.
+fn stamp(text: &str) -> Option<i128> {
+    let instant = text.parse::<Timestamp>().ok();
+    let local = || {
+        let time: DateTime = text.parse().ok()?;
+        TimeZone::UTC.to_timestamp(time).ok()
+    };
+    instant.or_else(local).map(Timestamp::as_nanosecond)
+}
