@@ -1,4 +1,4 @@
-"""What every example does with its design: simulate, draw, export, and run the FMUs in fmpy."""
+"""What every example does with its design: simulate, draw, try at random, export, and run the FMUs in fmpy."""
 
 from __future__ import annotations
 
@@ -23,6 +23,7 @@ def main(make: Callable[[], ftc.Design], script: Path) -> None:
     """Runs the study; fails where fault tolerance is not nearly as good as being told the fault."""
     parser = argparse.ArgumentParser(description=script.stem)
     parser.add_argument("--out", type=Path, default=Path("out") / script.stem)
+    parser.add_argument("--runs", type=int, default=500, help="random runs of the campaign")
     arguments = parser.parse_args()
     arguments.out.mkdir(parents=True, exist_ok=True)
 
@@ -39,6 +40,10 @@ def main(make: Callable[[], ftc.Design], script: Path) -> None:
         raise SystemExit("fault tolerance is not as good as being told the fault")
     if not (errors["ftc"] < errors["no_ftc"]).all():
         raise SystemExit("fault tolerance does not improve the true error")
+
+    campaign = ftc.campaign(design, runs=arguments.runs)
+    print(campaign)
+    campaign.save(arguments.out)
 
     controller, plant = design.export(arguments.out)
     print(f"wrote {controller} and {plant} for {', '.join(ftc.platforms())}")

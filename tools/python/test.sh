@@ -11,7 +11,7 @@ mkdir -p "$folder"
 "${PYTHON:-python3}" -m venv "$environment"
 wheel=$(ls -t dist/ftc_fmu-*manylinux*x86_64.whl | head -1)
 "$environment/bin/pip" install --quiet --disable-pip-version-check "${wheel}[all]" --constraint tests/requirements.txt \
-    --requirement tests/requirements.txt
+    --constraint tools/python/tests/requirements.txt --requirement tests/requirements.txt
 
 # No cargo, no rustc: what is tested is what a user has.
 PATH=$PWD/$environment/bin:/usr/local/bin:/usr/bin:/bin
@@ -26,7 +26,7 @@ done
 python -m pytest -c tools/python/pytest.ini --rootdir tools/python
 python tools/python/readme.py README.md "$folder/readme"
 for example in quadruple_tank dc_motor boost_converter; do
-    python "examples/python/$example.py" --out "$folder/$example"
+    python "examples/python/$example.py" --out "$folder/$example" --runs 100
 done
 python examples/python/from_a_log.py --out "$folder/from_a_log"
 FTC_FMU=$PWD/$environment/bin/ftc-fmu python -m pytest tests

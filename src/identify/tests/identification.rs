@@ -1,4 +1,6 @@
 //! Identified models against the plants that made the logs, on data they did not see.
+//!
+//! promise: identify
 
 use ftc_identify::{Coordinates, Error, Identified, Log, Settings, identify};
 use nalgebra::{DMatrix, DVector};

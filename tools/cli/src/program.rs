@@ -14,6 +14,7 @@
 mod as_printed;
 mod campaigns;
 mod failure;
+mod identification;
 mod progress;
 
 use clap::{Parser, Subcommand, ValueEnum};
@@ -127,6 +128,13 @@ enum Command {
     /// merge to the last digit. An interrupt (Ctrl-C) keeps the runs that are done.
     #[command(after_help = EXIT_CODES)]
     Campaign(campaigns::Arguments),
+    /// Identify a plant from logs of healthy operation and write a design file for it.
+    ///
+    /// One linear model per mode, by subspace identification; the order is chosen by the fit of a free
+    /// simulation, and the fit on data held out is printed. Where the log holds switches between
+    /// modes, the models share one state.
+    #[command(after_help = EXIT_CODES)]
+    Identify(identification::Asked),
     /// Run the paper's experiments and write one page each, with the same numbers as JSON and CSV.
     ///
     /// paper: its example in every variant, what it says beside what is found, and its figures.
@@ -224,6 +232,14 @@ fn run(arguments: &Arguments, binaries: Option<PathBuf>) -> Result<String, Failu
             let made = solve(asked.design(), &progress)?;
             drop(progress);
             campaigns::run(made, asked, arguments.quiet)
+        }
+        Command::Identify(asked) => {
+            let (folder, name) = asked.target();
+            check_output(&folder)?;
+            progress.tell("identifying");
+            let (text, found) = identification::identify(asked).map_err(Failure::Input)?;
+            write(&folder, &[(name.clone(), text.into_bytes())])?;
+            Ok(format!("{found}wrote {}\n", folder.join(name).display()))
         }
         Command::Reproduce { experiment, out } => {
             check_output(out)?;

@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Any
 
 from ftc_fmu import _core
 from ftc_fmu._place import HOME
+from ftc_fmu.campaigns import Campaign, campaign
 from ftc_fmu.controller import Controller
 from ftc_fmu.design import Design, design, load
 from ftc_fmu.errors import DesignFileError, FtcError, Infeasible, MissingExtra, NoDesign, Uncertified, Unproved
@@ -48,6 +49,7 @@ def platforms() -> list[str]:
 
 
 __all__ = [
+    "Campaign",
     "Controller",
     "Design",
     "DesignFileError",
@@ -63,6 +65,7 @@ __all__ = [
     "Run",
     "Uncertified",
     "Unproved",
+    "campaign",
     "design",
     "load",
     "platforms",

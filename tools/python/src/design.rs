@@ -1,5 +1,6 @@
 //! Designs: solved, read again, simulated, exported.
 
+use crate::campaigns;
 use crate::controller::Controller;
 use crate::errors::{self, Author};
 use crate::run::Run;
@@ -15,8 +16,9 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 /// A design and what its user should know of it.
-struct Made {
-    design: ftc_design::Design,
+pub struct Made {
+    /// The design.
+    pub design: ftc_design::Design,
     warnings: Vec<String>,
 }
 
@@ -47,11 +49,12 @@ pub fn solve(
     let author = called.map_or(Author::Package, Author::User);
     let loaded =
         design_file::parse(text, &folder).map_err(|error| errors::of_input(py, error, author))?;
-    let what = "solving for gains and certifying them";
-    let made = wait(py, what, listener.as_ref(), move || {
+    let what = || "solving for gains and certifying them".to_string();
+    let made = wait(py, &what, listener.as_ref(), move || {
         let logged = LoggedMovement::of(&loaded.request.estimator.database);
         let design = assemble(loaded.request)?;
-        let warnings = warnings::of_design(&loaded.file, logged.as_ref(), &design);
+        let mut warnings = loaded.notes;
+        warnings.extend(warnings::of_design(&loaded.file, logged.as_ref(), &design));
         Ok::<_, DesignError>(Made { design, warnings })
     })?;
     made.map(|made| Design(Arc::new(made)))
@@ -81,7 +84,7 @@ impl Design {
     /// The page that the FMU carries, with the figures of its scenario.
     fn html(&self, py: Python<'_>) -> PyResult<String> {
         let made = self.0.clone();
-        wait(py, "simulating", None, move || {
+        wait(py, &|| "simulating".into(), None, move || {
             let runs = report::documentation::runs(&made.design);
             let lead = "Sensor-fault-tolerant controller of a switched plant.".into();
             report::documentation::page(&made.design, &runs, None, made.design.name.clone(), lead)
@@ -117,7 +120,7 @@ impl Design {
             design.true_plant = request.true_plant;
         }
         let made = self.0.clone();
-        let simulated = wait(py, "simulating", None, move || {
+        let simulated = wait(py, &|| "simulating".into(), None, move || {
             Run::of(&design, made.warnings.clone(), baselines)
         })?;
         simulated.map_err(|what| errors::of_sentence(py, what))
@@ -139,12 +142,35 @@ impl Design {
             ssp,
             platforms,
         };
-        let written = wait(py, "exporting", None, move || {
+        let written = wait(py, &|| "exporting".into(), None, move || {
             package::export(&made.design, &options)
         })?;
         written
             .map(|exported| exported.paths)
             .map_err(|error| errors::of_package(py, error))
+    }
+
+    /// Does runs of a campaign; returns the part of it that they are.
+    #[pyo3(signature = (options, first, last, threads=None, listener=None))]
+    fn campaign<'py>(
+        &self,
+        py: Python<'py>,
+        options: &str,
+        first: u64,
+        last: u64,
+        threads: Option<usize>,
+        listener: Option<Py<PyAny>>,
+    ) -> PyResult<Bound<'py, PyBytes>> {
+        let options = campaigns::options(py, options)?;
+        let watched = (threads, listener.as_ref());
+        let part = campaigns::run(py, self.0.clone(), options, first..last, watched)?;
+        Ok(PyBytes::new(py, &part))
+    }
+
+    /// The page of a campaign.
+    fn campaign_html(&self, part: &[u8], asked: u64) -> PyResult<String> {
+        let part = campaigns::read(part)?;
+        Ok(campaign::page::html(&self.0.design, &part, asked))
     }
 
     /// The controller at rest.

@@ -87,7 +87,7 @@ pub fn identify(
         periods,
         ..Settings::default()
     };
-    let found = wait(py, "identifying", None, move || {
+    let found = wait(py, &|| "identifying".into(), None, move || {
         ftc_identify::identify(&logs, &settings)
     })?;
     found

@@ -4,6 +4,7 @@
 //! does: the same reader, the same refusals, the same bits. Only plain values cross over: texts,
 //! lists of numbers, bytes of doubles. Documentation for users is in the Python sources and stubs.
 
+mod campaigns;
 mod controller;
 mod design;
 mod errors;
@@ -17,6 +18,8 @@ use std::path::{Path, PathBuf};
 
 #[pymodule]
 mod _core {
+    #[pymodule_export]
+    use super::campaigns::{campaign_json, campaign_merge, campaign_missing};
     #[pymodule_export]
     use super::controller::Controller;
     #[pymodule_export]

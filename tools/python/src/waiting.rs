@@ -20,14 +20,14 @@ const STACK: usize = 8 << 20;
 /// What interrupted the wait.
 pub fn wait<T: Send + 'static>(
     py: Python<'_>,
-    what: &str,
+    what: &dyn Fn() -> String,
     listener: Option<&Py<PyAny>>,
     work: impl FnOnce() -> T + Send + 'static,
 ) -> PyResult<T> {
     let (send, mut receive) = channel();
     let begun = Instant::now();
     let mut told = begun;
-    tell(py, listener, what, begun)?;
+    tell(py, listener, &what(), begun)?;
     thread::Builder::new()
         .stack_size(STACK)
         .spawn(move || send.send(work()).ok())
@@ -42,7 +42,8 @@ pub fn wait<T: Send + 'static>(
             Ok(result) => return Ok(result),
             Err(RecvTimeoutError::Disconnected) => {
                 return Err(PyRuntimeError::new_err(format!(
-                    "{what} ended with a panic, which is a bug: report it"
+                    "{} ended with a panic, which is a bug: report it",
+                    what()
                 )));
             }
             Err(RecvTimeoutError::Timeout) => {}
@@ -50,7 +51,7 @@ pub fn wait<T: Send + 'static>(
         py.check_signals()?;
         if told.elapsed() >= BETWEEN_REPORTS {
             told = Instant::now();
-            tell(py, listener, what, begun)?;
+            tell(py, listener, &what(), begun)?;
         }
     }
 }

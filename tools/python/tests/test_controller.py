@@ -1,4 +1,7 @@
-"""The controller in a NumPy loop is the one that was simulated."""
+"""The controller in a NumPy loop is the one that was simulated.
+
+promise: python-same
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,7 @@
-"""Designs: the same as the command line's, with errors that have parts."""
+"""Designs: the same as the command line's, with errors that have parts.
+
+promise: python-same
+"""
 
 from __future__ import annotations
 

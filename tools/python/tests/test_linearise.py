@@ -1,4 +1,7 @@
-"""Plants from FMUs: of another maker (built here, FMI 2 and 3), and our own nonlinear rectifier."""
+"""Plants from FMUs: of another maker (built here, FMI 2 and 3), and our own nonlinear rectifier.
+
+promise: python-fmu-in
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,7 @@
-"""Logs from data frames, and plants identified from them."""
+"""Logs from data frames, and plants identified from them.
+
+promise: identify
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,7 @@
-"""Simulated experiments as arrays, tables and pictures."""
+"""Simulated experiments as arrays, tables and pictures.
+
+promise: python-same
+"""
 
 from __future__ import annotations
 
