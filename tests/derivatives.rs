@@ -7,7 +7,7 @@
 
 mod common;
 
-use common::{Channel, controller, plant, reference, scenario};
+use common::{Channel, controller, plant, reference, scenario, state_based};
 use ftc_control::parameters::{Compensation, EstimatorMethod, Limits, Transfer};
 use ftc_control::{Compensate, Controller, ControllerParameters, ControllerState, Matrix};
 use ftc_plant::rectifier::Rectifier;
@@ -37,6 +37,7 @@ fn design() -> impl Strategy<Value = Design> {
         Compensation::None,
     ]);
     let method = prop::sample::select(vec![
+        EstimatorMethod::Observer,
         EstimatorMethod::Reference,
         EstimatorMethod::Sliding,
         EstimatorMethod::None,
@@ -57,6 +58,9 @@ fn design() -> impl Strategy<Value = Design> {
 fn parameters(design: Design) -> ControllerParameters {
     let mut parameters = controller(Channel::State, 0.005);
     parameters.compensation = design.compensation;
+    if design.method == EstimatorMethod::Observer {
+        parameters = state_based(Channel::State, 0.005);
+    }
     parameters.estimator.method = design.method;
     parameters.estimator.adapt = design.adapt;
     parameters.feedback.latency = design.latency;

@@ -10,8 +10,8 @@ use ftc_design::assembly::{
     DatabaseSource, EstimatorSpec, KnownDisturbance, Request, Threshold, assemble,
 };
 use ftc_design::{
-    ControlSpec, Design, DesignError, Lyapunov, ObserverChoice, ObserverSpec, Signal, Signals,
-    check_controllable, state_feedback,
+    ControlSpec, Design, DesignError, HypothesesSpec, Lyapunov, ObserverChoice, ObserverSpec,
+    Signal, Signals, check_controllable, state_feedback,
 };
 use ftc_plant::scaling::Scaling;
 use ftc_plant::scenario::{ModeInterval, Waveform};
@@ -80,6 +80,7 @@ fn design(channel: Channel, control: ControlSpec) -> Design {
             debounce: 1,
             stuck_after: 0,
             adapt: false,
+            hypotheses: HypothesesSpec::default(),
             disturbance: Some(disturbance(1)),
         },
         compensation: Compensation::VirtualSensor,

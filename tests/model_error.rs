@@ -12,7 +12,8 @@ use ftc_design::assembly::{
     DatabaseSource, EstimatorSpec, KnownDisturbance, Request, Threshold, assemble,
 };
 use ftc_design::{
-    ControlSpec, Design, ObserverChoice, ObserverSpec, Signal, Signals, commissioning,
+    ControlSpec, Design, HypothesesSpec, ObserverChoice, ObserverSpec, Signal, Signals,
+    commissioning,
 };
 use ftc_plant::SwitchedPlant;
 use ftc_plant::TruePlant;
@@ -98,6 +99,7 @@ fn design(model: &SwitchedPlant, truth: &SwitchedPlant, noise: f64) -> Design {
             debounce: 1,
             stuck_after: 0,
             adapt: false,
+            hypotheses: HypothesesSpec::default(),
             disturbance: Some(KnownDisturbance {
                 period: core::f64::consts::TAU / 0.02,
                 harmonics: 1,

@@ -131,6 +131,39 @@ pub fn controller(interface: &Interface) -> VariableTable {
         Range::Difference,
     ));
 
+    table.extend(outputs.iter().enumerate().map(|(at, signal)| {
+        output.boolean(
+            format!("suspect[{}]", at + 1),
+            format!(
+                "Slow divergence of {}: a sensor fault or a load",
+                signal.name
+            ),
+            Role::Suspect,
+            false,
+        )
+    }));
+    table.push(output.boolean(
+        "model_valid".into(),
+        "The model explains the readings".into(),
+        Role::ModelValid,
+        true,
+    ));
+    table.extend(output.vector(
+        "load_hat",
+        "What acts on the plant beside the command of",
+        Role::LoadEstimate,
+        &deviations(inputs),
+        Range::Open,
+    ));
+    table.extend(inputs.iter().enumerate().map(|(at, signal)| {
+        output.boolean(
+            format!("actuator_fault[{}]", at + 1),
+            format!("Load or gain error on {} beyond its size", signal.name),
+            Role::ActuatorFault,
+            false,
+        )
+    }));
+
     let modes = vec![scalar(mode), scalar(real)];
     // Before the first tick nothing is computed but the operating point of the active mode.
     for role in [Role::Command, Role::StateEstimate] {

@@ -88,6 +88,14 @@ pub enum Role {
     FaultFlag,
     /// `fault_real`, the flags as Reals (p).
     FaultFlagReal,
+    /// `suspect`, flags (p).
+    Suspect,
+    /// `model_valid`, a flag.
+    ModelValid,
+    /// `load_hat` (m).
+    LoadEstimate,
+    /// `actuator_fault`, flags (m).
+    ActuatorFault,
     /// `ftc_enabled`, switches the compensation.
     FtcEnabled,
     /// `threshold`, of the residuals (p).

@@ -6,7 +6,10 @@ use ftc_control::parameters::{
     ObserverKind, StateFeedback,
 };
 use ftc_control::{ControllerParameters, Matrix};
-use ftc_design::{ControllerDesign, commissioning, mode_models, plain};
+use ftc_design::assembly::KnownDisturbance;
+use ftc_design::{
+    ControllerDesign, HypothesesSpec, Signal, Signals, commissioning, mode_models, plain,
+};
 use ftc_plant::Scenario;
 use ftc_plant::scenario::{ModeInterval, Waveform};
 use ftc_plant::{Mode, OperatingPoint, SwitchedPlant};
@@ -175,6 +178,7 @@ pub fn controller_design(channel: Channel, noise: f64) -> ControllerDesign {
         },
         estimator: Estimator {
             method: EstimatorMethod::Reference,
+            hypotheses: None,
             response_length: length,
             window: 2 * (length + 1) + 20,
             predictors,
@@ -214,4 +218,37 @@ pub fn controller(channel: Channel, noise: f64) -> ControllerParameters {
         compensation: design.compensation,
         input_limits: design.input_limits,
     }
+}
+
+/// The same controller with the state-based estimator.
+#[allow(dead_code)]
+pub fn state_based(channel: Channel, noise: f64) -> ControllerParameters {
+    let mut parameters = controller(channel, noise);
+    let plant = plant(channel);
+    let signals = |name: &str, count: usize| -> Vec<Signal> {
+        let signal = |at| Signal {
+            name: format!("{name}[{at}]"),
+            unit: None,
+            nominal: 1.0,
+            min: None,
+            max: None,
+        };
+        (1..=count).map(signal).collect()
+    };
+    let dims = plant.dimensions();
+    let signals = Signals {
+        inputs: signals("u", dims.inputs),
+        outputs: signals("y", dims.outputs),
+        states: signals("x", dims.states),
+        disturbances: signals("w", dims.disturbances),
+    };
+    let known = KnownDisturbance {
+        period: core::f64::consts::TAU / 0.02,
+        harmonics: 1,
+        amplitude: None,
+    };
+    let settings = HypothesesSpec::default().settings(&plant, &signals, Some(&known));
+    parameters.estimator.method = EstimatorMethod::Observer;
+    parameters.estimator.hypotheses = Some(settings);
+    parameters
 }

@@ -5,7 +5,9 @@ use ftc_control::parameters::{Compensation, EstimatorMethod};
 use ftc_design::assembly::{
     DatabaseSource, EstimatorSpec, KnownDisturbance, Request, Threshold, assemble,
 };
-use ftc_design::{ControlSpec, Design, Lyapunov, ObserverChoice, ObserverSpec, Signal, Signals};
+use ftc_design::{
+    ControlSpec, Design, HypothesesSpec, Lyapunov, ObserverChoice, ObserverSpec, Signal, Signals,
+};
 use ftc_plant::Scenario;
 use ftc_plant::scenario::{ModeInterval, Waveform};
 use ftc_plant::{Mode, OperatingPoint, SwitchedPlant, spectral_radius};
@@ -66,6 +68,11 @@ fn signals(name: &str, count: usize) -> Vec<Signal> {
 
 /// A random plant with a certified design; draws until one exists.
 pub fn design(dice: &mut Dice) -> Design {
+    design_with(dice, EstimatorMethod::Reference)
+}
+
+/// The same with an estimator of one's choice.
+pub fn design_with(dice: &mut Dice, method: EstimatorMethod) -> Design {
     loop {
         let (n, m, p) = (dice.count(1, 5), dice.count(1, 3), dice.count(1, 3));
         let output = dice.matrix(p, n);
@@ -125,13 +132,14 @@ pub fn design(dice: &mut Dice) -> Design {
                 noise: Vec::new(),
             },
             estimator: EstimatorSpec {
-                method: EstimatorMethod::Reference,
+                method,
                 response_length: None,
                 database: DatabaseSource::Commission,
                 threshold: Threshold::Sigmas(6.0),
                 debounce: 1,
                 stuck_after: 0,
                 adapt: false,
+                hypotheses: HypothesesSpec::default(),
                 disturbance: Some(KnownDisturbance {
                     period,
                     harmonics: 1,

@@ -8,6 +8,7 @@ use fmu_abi::clock::Event;
 use fmu_abi::{
     Readiness, Refusal, Slave, Values, nearest_mode, require_finite, resource, selected_mode,
 };
+use ftc_control::estimator::hypotheses::{Sensors, has};
 use ftc_control::{Change, Compensate, Controller, ControllerState, Sample};
 use model_description::{CONTROLLER, DESIGN_FILE, Interface, Role, Span, VariableTable};
 use std::path::Path;
@@ -38,6 +39,10 @@ struct Spans {
     residual: Span,
     fault_flag: Span,
     fault_real: Span,
+    suspect: Span,
+    model_valid: Span,
+    load_estimate: Span,
+    actuator_fault: Span,
 }
 
 impl Spans {
@@ -54,6 +59,10 @@ impl Spans {
             residual: table.span(Role::Residual),
             fault_flag: table.span(Role::FaultFlag),
             fault_real: table.span(Role::FaultFlagReal),
+            suspect: table.span(Role::Suspect),
+            model_valid: table.span(Role::ModelValid),
+            load_estimate: table.span(Role::LoadEstimate),
+            actuator_fault: table.span(Role::ActuatorFault),
         }
     }
 }
@@ -97,6 +106,16 @@ impl ControllerFmu {
                 *slot = f64::from(u8::from(flagged));
             }
         }
+        let Some(bank) = &state.bank else { return };
+        let flag = |set: Sensors, at: usize| f64::from(u8::from(has(set, at)));
+        for (at, slot) in values.get_mut(spans.suspect).iter_mut().enumerate() {
+            *slot = flag(bank.suspect, at);
+        }
+        for (at, slot) in values.get_mut(spans.actuator_fault).iter_mut().enumerate() {
+            *slot = flag(bank.actuator_fault, at);
+        }
+        values.set(spans.load_estimate, &bank.load);
+        values.set(spans.model_valid, &[f64::from(u8::from(bank.model_valid))]);
     }
 }
 

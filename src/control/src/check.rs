@@ -3,8 +3,8 @@
 use crate::error::ControllerError;
 use crate::matrix::Matrix;
 use crate::parameters::{
-    ControllerParameters, Estimator, EstimatorMethod, Harmonics, Limits, Observer, Predictor,
-    StateFeedback,
+    ControllerParameters, Estimator, EstimatorMethod, Harmonics, Hypotheses, Limits, Observer,
+    Predictor, StateFeedback,
 };
 use alloc::format;
 use alloc::string::String;
@@ -222,10 +222,98 @@ fn estimator(estimator: &Estimator, sizes: Sizes) -> Checked {
         let regressors = sizes.inputs.saturating_mul(estimator.response_length);
         self::predictor(predictor, index, p, regressors)?;
     }
+    match (estimator.method, &estimator.hypotheses) {
+        (EstimatorMethod::Observer, Some(settings)) => hypotheses(settings, sizes)?,
+        (method, _) => range(
+            method != EstimatorMethod::Observer,
+            "estimator.hypotheses",
+            "must be there for the state-based method",
+        )?,
+    }
     match &estimator.harmonics {
         Some(known) => harmonics(known, estimator, sizes),
         None => Ok(()),
     }
+}
+
+/// Largest size of anything physical, and largest share or logarithm.
+const LARGEST_SIZE: f64 = 1e50;
+const LARGEST_SHARE: f64 = 1e6;
+
+fn hypotheses(settings: &Hypotheses, sizes: Sizes) -> Checked {
+    let (n, m, p) = (sizes.states, sizes.inputs, sizes.outputs);
+    length(
+        "estimator.hypotheses.channels",
+        settings.channels.len(),
+        sizes.modes,
+    )?;
+    let s = settings.channels.first().map_or(0, |first| first.e.ncols());
+    for channels in &settings.channels {
+        shape(
+            "estimator.hypotheses.channels.e".into(),
+            &channels.e,
+            (n, s),
+        )?;
+        shape(
+            "estimator.hypotheses.channels.f".into(),
+            &channels.f,
+            (p, s),
+        )?;
+    }
+    for (what, values, needed) in [
+        ("fault_size", &settings.fault_size, p),
+        ("authority", &settings.authority, p),
+        ("input_load", &settings.input_load, m),
+        ("disturbance_load", &settings.disturbance_load, s),
+        (
+            "disturbance_size",
+            &settings.disturbance_size,
+            2 * s * settings.angles.len(),
+        ),
+        ("state_load", &settings.state_load, n),
+        ("state_size", &settings.state_size, n),
+        ("start", &settings.start, n),
+        ("start_elsewhere", &settings.start_elsewhere, n),
+    ] {
+        let field = format!("estimator.hypotheses.{what}");
+        length(field.as_str(), values.len(), needed)?;
+        let sensible = values
+            .iter()
+            .all(|value| (0.0..=LARGEST_SIZE).contains(value));
+        range(sensible, field, "must hold numbers from 0 to 1e50")?;
+    }
+    let rates = [
+        settings.fault_rate,
+        settings.stuck_rate,
+        settings.release_rate,
+        settings.change_rate,
+        settings.load_rate,
+        settings.load_moving,
+    ];
+    let sensible = rates.iter().all(|rate| (1e-100..=0.999).contains(rate));
+    range(
+        sensible,
+        "estimator.hypotheses",
+        "must have rates from 1e-100 to 0.999",
+    )?;
+    let shares = [
+        settings.surprise,
+        settings.odds,
+        settings.fault_walk,
+        settings.drift_walk,
+        settings.load_walk,
+        settings.model_error,
+        settings.gain_error,
+        settings.gain_walk,
+        settings.period_error,
+    ];
+    let mut shares = shares.iter().chain(&settings.angles);
+    let sensible = shares.all(|share| (0.0..=LARGEST_SHARE).contains(share));
+    range(
+        sensible,
+        "estimator.hypotheses",
+        "must have shares and angles from 0 to 1e6",
+    )
 }
 
 fn predictor(predictor: &Predictor, index: usize, outputs: usize, regressors: usize) -> Checked {

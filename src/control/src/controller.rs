@@ -7,12 +7,15 @@ use alloc::vec::Vec;
 pub use derivative::Change;
 
 use super::compensation::{self, AdditiveControl};
+use super::estimator::hypotheses::{Bank, BankState};
 use super::estimator::{EstimatorState, Observation};
 use super::integrator;
 use super::kernel;
 use super::observer::{ObservedMode, ObserverState};
 use super::open_loop::OpenLoop;
-use super::parameters::{Compensation, ControllerParameters, FeedbackGains, Limits, ModeModel};
+use super::parameters::{
+    Compensation, ControllerParameters, EstimatorMethod, FeedbackGains, Limits, ModeModel,
+};
 use super::repetition::Repetition;
 use crate::check::{self, Sizes};
 use crate::error::{ControllerError, SampleError};
@@ -25,6 +28,8 @@ pub struct Controller {
     parameters: ControllerParameters,
     modes: Vec<ObservedMode>,
     sizes: Sizes,
+    /// The state-based estimator, where it is chosen.
+    bank: Option<Bank>,
 }
 
 /// What a tick is told; made by [`Controller::sample`], which checks its sizes.
@@ -101,6 +106,8 @@ pub struct ControllerState {
     open_loop: OpenLoop,
     /// Fault estimator.
     pub estimator: EstimatorState,
+    /// The state-based estimator, where it is chosen.
+    pub bank: Option<BankState>,
     /// Integrator state `Z` and resonators (q).
     pub integral: Vec<f64>,
     /// The printed additive control, where it is chosen.
@@ -127,8 +134,8 @@ pub struct ControllerState {
 
 crate::state!(ControllerState {
     parts: [
-        repetition, observer, open_loop, estimator, integral, additive, command, corrected, acting,
-        deviation, offset, excess, substitute, no_fault
+        repetition, observer, open_loop, estimator, bank, integral, additive, command, corrected,
+        acting, deviation, offset, excess, substitute, no_fault
     ],
     constants: [],
     counters: [mode, since]
@@ -142,9 +149,19 @@ impl Controller {
     pub fn new(parameters: ControllerParameters) -> Result<Self, ControllerError> {
         let sizes = check::check(&parameters)?;
         let modes = parameters.modes.iter().map(ObservedMode::new).collect();
+        let bank = match (
+            parameters.estimator.method,
+            &parameters.estimator.hypotheses,
+        ) {
+            (EstimatorMethod::Observer, Some(settings)) => {
+                Some(Bank::new(&parameters.modes, settings))
+            }
+            _ => None,
+        };
         Ok(Self {
             parameters,
             modes,
+            bank,
             sizes,
         })
     }
@@ -202,6 +219,7 @@ impl Controller {
             observer: ObserverState::new(&point.x0, dims.outputs),
             open_loop: OpenLoop::new(&point.x0, dims.outputs),
             estimator: EstimatorState::new(&self.parameters.estimator, &point.u0, dims.outputs),
+            bank: self.bank.as_ref().map(|bank| bank.start(mode)),
             integral: vec![0.0; self.parameters.feedback.integral_size()],
             additive: (self.parameters.compensation == Compensation::Additive)
                 .then(|| AdditiveControl::new(tracked, dims.inputs)),
@@ -232,19 +250,23 @@ impl Controller {
         };
         let left = self.enter(state, mode, sample.thresholds);
         let settings = &self.parameters.estimator;
-        state.estimator.observe(
-            settings,
-            &Observation {
+        let readings = state
+            .repetition
+            .screen(sample.measurement, settings.stuck_after);
+        if let (Some(bank), Some(judged)) = (&self.bank, &mut state.bank) {
+            bank.observe(judged, mode, readings, sample.thresholds);
+            state.estimator.adopt(settings, judged, readings);
+        } else {
+            let seen = Observation {
                 tick: sample.tick,
                 mode,
                 u0: &point.u0,
                 y0: &point.y0,
-                y: state
-                    .repetition
-                    .screen(sample.measurement, settings.stuck_after),
+                y: readings,
                 thresholds: sample.thresholds,
-            },
-        );
+            };
+            state.estimator.observe(settings, &seen);
+        }
         self.correct_measurement(state, model, sample);
         state.observer.correct(
             &self.parameters.observer,
@@ -265,7 +287,8 @@ impl Controller {
 
     /// Whether a state has the sizes of this controller; one that came as bytes may not.
     pub fn fits(&self, state: &ControllerState) -> bool {
-        state.same_shape(&self.initial_state(0))
+        let sound = state.bank.as_ref().is_none_or(BankState::sound);
+        sound && state.same_shape(&self.initial_state(0))
     }
 
     /// Notes the mode and returns the one just left.
@@ -442,7 +465,11 @@ impl Controller {
                 *offset = kernel::bounded(transfer.decay * *offset);
             }
         }
-        state.estimator.remember(&state.acting);
+        if let (Some(bank), Some(judged)) = (&self.bank, &mut state.bank) {
+            bank.advance(judged, &state.acting);
+        } else {
+            state.estimator.remember(&state.acting);
+        }
     }
 }
 

@@ -162,6 +162,8 @@ pub struct LostSet {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum EstimatorMethod {
+    /// State-based: hypotheses about sensors and plant in competition.
+    Observer,
     /// Least-squares predictor from a healthy database (55)-(60).
     Reference,
     /// The sliding window as printed (44).
@@ -175,6 +177,9 @@ pub enum EstimatorMethod {
 pub struct Estimator {
     /// Method.
     pub method: EstimatorMethod,
+    /// Sizes and rates for [`EstimatorMethod::Observer`].
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub hypotheses: Option<Hypotheses>,
     /// `j`: how many past inputs the output remembers.
     pub response_length: usize,
     /// `L`: samples in the window of [`EstimatorMethod::Sliding`], more than `m j`.
@@ -200,6 +205,91 @@ pub struct Estimator {
     pub leverage_limit: f64,
     /// Largest magnitude an estimate may take, per sensor (p).
     pub largest_fault: Vec<f64>,
+}
+
+/// What is done about a divergence that could be a sensor's drift or a load.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Ambiguous {
+    /// The sensors are believed, and the alarm is up.
+    TrustSensors,
+    /// The model is believed: the sensor is corrected.
+    TrustModel,
+}
+
+/// How the periodic disturbance enters in one mode.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Channels {
+    /// Into the state: `E` (n x s).
+    pub e: Matrix,
+    /// Into the outputs: `F` (p x s).
+    pub f: Matrix,
+}
+
+/// Sizes and rates of what may happen to sensors and plant, for [`EstimatorMethod::Observer`].
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Hypotheses {
+    /// How the disturbance enters, per mode.
+    pub channels: Vec<Channels>,
+    /// Faults per sample and sensor.
+    pub fault_rate: f64,
+    /// Freezes per sample and sensor.
+    pub stuck_rate: f64,
+    /// Ends of a fault per sample: one over its mean length.
+    pub release_rate: f64,
+    /// Jumps of a present fault per sample.
+    pub change_rate: f64,
+    /// Jumps of loads or of input gains per sample.
+    pub load_rate: f64,
+    /// Probability that a load that moves goes on moving in the next sample.
+    pub load_moving: f64,
+    /// What a sample costs at most while loads move, in log likelihood.
+    pub surprise: f64,
+    /// Log odds that an accusation must have against the best explanation without one.
+    pub odds: f64,
+    /// Standard deviation of a new fault (p), output units.
+    pub fault_size: Vec<f64>,
+    /// How far a fault that came abruptly wanders per sample, in noise deviations.
+    pub fault_walk: f64,
+    /// The same for a fault that grew slowly.
+    pub drift_walk: f64,
+    /// Standard deviation of a load on each input (m), input units.
+    pub input_load: Vec<f64>,
+    /// Standard deviation of a load on each disturbance channel (s), its units.
+    pub disturbance_load: Vec<f64>,
+    /// How far a load on the states themselves displaces them at rest (n), state units.
+    pub state_load: Vec<f64>,
+    /// How far a load wanders per sample, relative to the size of its jumps.
+    pub load_walk: f64,
+    /// Relative error of the entries of the plant's matrices.
+    pub model_error: f64,
+    /// Standard deviation of the relative error of an input's gain.
+    pub gain_error: f64,
+    /// How far an input's gain wanders per sample.
+    pub gain_walk: f64,
+    /// Relative error of the disturbance's period.
+    pub period_error: f64,
+    /// Standard deviation of each state of the disturbance (2 x harmonics x s).
+    pub disturbance_size: Vec<f64>,
+    /// Angle per sample of each harmonic, in radians; empty without a known period.
+    pub angles: Vec<f64>,
+    /// Typical deviation of each state from its operating point (n).
+    pub state_size: Vec<f64>,
+    /// Standard deviation of the state at the start (n).
+    pub start: Vec<f64>,
+    /// The same where the plant was not at rest (n).
+    pub start_elsewhere: Vec<f64>,
+    /// Largest correction of each sensor (p), output units.
+    pub authority: Vec<f64>,
+    /// What is done about a slow divergence.
+    pub ambiguous: Ambiguous,
+}
+
+impl Hypotheses {
+    /// Whether a slow divergence is taken for a sensor's fault.
+    pub fn trusts_model(&self) -> bool {
+        self.ambiguous == Ambiguous::TrustModel
+    }
 }
 
 /// `y ~ y0 + response * phi`, with `phi` the last `j` inputs relative to `u0`, oldest first.

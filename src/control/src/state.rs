@@ -21,7 +21,13 @@ macro_rules! scalars {
     };
 }
 
-scalars!(f64, u32, bool);
+scalars!(f64, u32, u64, bool);
+
+impl<const N: usize> State for [f64; N] {
+    fn same_shape(&self, _: &Self) -> bool {
+        true
+    }
+}
 
 impl<T: State> State for Vec<T> {
     fn same_shape(&self, other: &Self) -> bool {

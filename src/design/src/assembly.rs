@@ -2,6 +2,7 @@
 
 use super::commissioning::{self, Database, LONGEST_RESPONSE, RecordedDisturbance};
 use super::harmonics;
+use super::hypotheses::HypothesesSpec;
 use super::matrices::{dense, plain};
 use super::{
     ControlSpec, ControllerDesign, Design, DesignError, FORMAT, ObserverSpec, Signal, Signals,
@@ -61,6 +62,8 @@ pub struct EstimatorSpec {
     pub adapt: bool,
     /// The periodic disturbance to be learned on line.
     pub disturbance: Option<KnownDisturbance>,
+    /// What is asked of the state-based method.
+    pub hypotheses: HypothesesSpec,
 }
 
 /// Where the healthy database comes from.
@@ -259,12 +262,12 @@ fn estimator(request: &Request, dims: Dimensions) -> Result<Estimator, String> {
     let spec = &request.estimator;
     let outputs = &request.signals.outputs;
     let response_length = match spec.method {
-        EstimatorMethod::None => 0,
+        EstimatorMethod::Observer | EstimatorMethod::None => 0,
         EstimatorMethod::Reference | EstimatorMethod::Sliding => response_length(request, dims)?,
     };
     let predictors = match spec.method {
         EstimatorMethod::Reference => predictors(request, response_length)?,
-        EstimatorMethod::None | EstimatorMethod::Sliding => Vec::new(),
+        EstimatorMethod::Observer | EstimatorMethod::None | EstimatorMethod::Sliding => Vec::new(),
     };
     let thresholds = thresholds(
         &spec.threshold,
@@ -272,15 +275,23 @@ fn estimator(request: &Request, dims: Dimensions) -> Result<Estimator, String> {
         &request.scenario.noise,
         outputs,
     );
+    let state_based = spec.method == EstimatorMethod::Observer;
     let harmonics = spec
         .disturbance
         .as_ref()
+        .filter(|_| !state_based)
         .map(|known| known_harmonics(known, &request.plant, &thresholds));
     let harmonic_transfers = harmonics.as_ref().map_or_else(Vec::new, |known| {
         harmonics::transfers(&request.plant, known.period, known.count)
     });
+    let hypotheses = state_based.then(|| {
+        let known = spec.disturbance.as_ref();
+        spec.hypotheses
+            .settings(&request.plant, &request.signals, known)
+    });
     Ok(Estimator {
         method: spec.method,
+        hypotheses,
         response_length,
         window: dims.inputs * (response_length + 1) + WINDOW_MARGIN,
         predictors,

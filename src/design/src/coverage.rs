@@ -3,13 +3,13 @@
 //! What the inequalities say nothing about is derived again from the plant and the certified gains, or
 //! held against a relation that it must satisfy. [`UNCOVERED`] names what is left.
 
-use crate::assembly;
+use crate::assembly::{self, KnownDisturbance};
 use crate::harmonics;
 use crate::matrices::dense;
 use crate::observer::{check_decoupling, lost_gains_fit};
-use crate::{Design, Synthesis};
+use crate::{Design, HypothesesSpec, Synthesis};
 use ftc_control::Matrix;
-use ftc_control::parameters::{Estimator, FeedbackGains, ObserverKind};
+use ftc_control::parameters::{Estimator, EstimatorMethod, FeedbackGains, ObserverKind};
 use nalgebra::DMatrix;
 
 /// How far a number may lie from what it is derived to be, relative to the largest of its kind:
@@ -23,7 +23,8 @@ const FARTHEST: f64 = 1e6;
 const LARGEST_THRESHOLD: f64 = 1e3;
 
 /// Numbers of a design that `verify` holds against bounds only, in words for its report.
-pub const UNCOVERED: [&str; 4] = [
+pub const UNCOVERED: [&str; 5] = [
+    "what the user tells the state-based estimator: model error, fault rate and length, largest correction, loads, the disturbance's size and period",
     "the values of the operating points (any are admissible: the claims are about deviations from them)",
     "the coefficients of the fault estimator's predictors and its thresholds, debounce and learning (the claims hold \
      while no estimate is taken out of the loop)",
@@ -221,7 +222,40 @@ fn check_estimator(design: &Design) -> Result<(), String> {
         ),
         (estimator.predictors.iter().all(plausible), "a predictor"),
         (transfers_fit(design, estimator), "a transfer of harmonics"),
+        (hypotheses_fit(design), "a size or rate of the estimator"),
     ])
+}
+
+/// The sizes and rates of the state-based estimator follow from the plant, the signals, and what
+/// the user may choose: model error, fault rate and length, authority, loads, policy, disturbance.
+fn hypotheses_fit(design: &Design) -> bool {
+    let estimator = &design.controller.estimator;
+    let Some(found) = &estimator.hypotheses else {
+        return estimator.method != EstimatorMethod::Observer;
+    };
+    let plant = &design.plant;
+    let spec = HypothesesSpec {
+        model_error: found.model_error,
+        fault_rate: found.fault_rate,
+        fault_length: 1.0 / found.release_rate,
+        ambiguous: found.ambiguous,
+        authority: Some(found.authority.clone()),
+        input_load: Some(found.input_load.clone()),
+    };
+    let known = found.angles.first().map(|&angle| KnownDisturbance {
+        period: core::f64::consts::TAU * plant.sample_time / angle,
+        harmonics: found.angles.len(),
+        amplitude: Some(found.disturbance_load.clone()),
+    });
+    let mut derived = spec.settings(plant, &design.signals, known.as_ref());
+    let turns = derived.angles.iter().zip(&found.angles);
+    let same_turns = turns.clone().all(|(a, b)| (a - b).abs() <= 1e-12 * a.abs());
+    derived.angles.clone_from(&found.angles);
+    derived.release_rate = found.release_rate;
+    let chosen = (0.0..=1.0).contains(&found.model_error)
+        && (1e-12..=0.1).contains(&found.fault_rate)
+        && (1e-9..=0.5).contains(&found.release_rate);
+    same_turns && chosen && derived == *found
 }
 
 /// Finite, a regular triangular factor, deviations that are none or positive.

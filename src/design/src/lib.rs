@@ -40,6 +40,8 @@ pub mod coverage;
 mod feedforward;
 pub mod harmonics;
 #[cfg(feature = "solver")]
+mod hypotheses;
+#[cfg(feature = "solver")]
 pub mod lmi;
 mod lyapunov;
 mod matrices;
@@ -62,6 +64,8 @@ use serde::{Deserialize, Serialize};
 
 pub use certificate::{CertificateError, ControlCertificate};
 pub use controllability::check_controllable;
+#[cfg(feature = "solver")]
+pub use hypotheses::HypothesesSpec;
 pub use lyapunov::{DwellTime, Lyapunov};
 pub use matrices::{dense, mode_models, plain};
 pub use observer::{LostCertificate, ObserverCertificate, ObserverDesign};

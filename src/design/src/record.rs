@@ -114,7 +114,7 @@ impl Design {
         let tracked = &self.controller.feedback.tracked;
         let predicted = match self.controller.estimator.method {
             EstimatorMethod::Reference => modes,
-            EstimatorMethod::Sliding | EstimatorMethod::None => {
+            EstimatorMethod::Observer | EstimatorMethod::Sliding | EstimatorMethod::None => {
                 self.controller.estimator.predictors.len()
             }
         };

@@ -16,7 +16,7 @@ use crate::true_plant;
 use crate::values::{NameOrList, NumberOrList};
 use ftc_control::parameters;
 use ftc_design::assembly::{DatabaseSource, EstimatorSpec, KnownDisturbance, Request, Threshold};
-use ftc_design::{ControlSpec, Lyapunov, Objective, ObserverSpec, Signal, Signals};
+use ftc_design::{ControlSpec, HypothesesSpec, Lyapunov, Objective, ObserverSpec, Signal, Signals};
 use ftc_plant::scenario::{ModeInterval, Waveform};
 use ftc_plant::{Dimensions, OperatingPoint, Scenario, SwitchedPlant};
 use std::path::Path;
@@ -384,7 +384,13 @@ fn estimator(
     dims: Dimensions,
     logs: &Logs,
 ) -> Result<EstimatorSpec, String> {
-    let method = match given.method.unwrap_or(defaults::ESTIMATOR) {
+    let database = database(given, logs)?;
+    let usual = match database {
+        DatabaseSource::Recorded(_) => EstimatorMethod::Reference,
+        DatabaseSource::Commission | DatabaseSource::Model => defaults::ESTIMATOR,
+    };
+    let method = match given.method.unwrap_or(usual) {
+        EstimatorMethod::Observer => parameters::EstimatorMethod::Observer,
         EstimatorMethod::Reference => parameters::EstimatorMethod::Reference,
         EstimatorMethod::Sliding => parameters::EstimatorMethod::Sliding,
         EstimatorMethod::None => parameters::EstimatorMethod::None,
@@ -413,12 +419,56 @@ fn estimator(
     Ok(EstimatorSpec {
         method,
         response_length,
-        database: database(given, logs)?,
+        database,
         threshold: threshold(given, dims)?,
         debounce,
         stuck_after,
         adapt: given.adapt.unwrap_or(defaults::ADAPT),
         disturbance,
+        hypotheses: hypotheses(given, dims)?,
+    })
+}
+
+fn hypotheses(given: &schema::Estimator, dims: Dimensions) -> Result<HypothesesSpec, String> {
+    let usual = HypothesesSpec::default();
+    let within = |key: &str, value: Option<f64>, usual: f64, least: f64, most: f64| match value {
+        None => Ok(usual),
+        Some(value) if (least..=most).contains(&value) => Ok(value),
+        Some(value) => Err(format!(
+            "estimator.{key} is {value}: it must lie between {least} and {most}"
+        )),
+    };
+    let sizes = |key: &str, value: &Option<NumberOrList>, count: usize| match value {
+        None => Ok(None),
+        Some(value) => {
+            let values = at(key, value.spread(count))?;
+            at(key, check::each(&values, check::positive))?;
+            Ok::<_, String>(Some(values))
+        }
+    };
+    Ok(HypothesesSpec {
+        model_error: within(
+            "model_error",
+            given.model_error,
+            usual.model_error,
+            0.0,
+            1.0,
+        )?,
+        fault_rate: within("fault_rate", given.fault_rate, usual.fault_rate, 1e-12, 0.1)?,
+        fault_length: within(
+            "fault_length",
+            given.fault_length,
+            usual.fault_length,
+            2.0,
+            1e9,
+        )?,
+        ambiguous: match given.ambiguous {
+            None => usual.ambiguous,
+            Some(schema::Ambiguous::TrustSensors) => parameters::Ambiguous::TrustSensors,
+            Some(schema::Ambiguous::TrustModel) => parameters::Ambiguous::TrustModel,
+        },
+        authority: sizes("estimator.authority", &given.authority, dims.outputs)?,
+        input_load: sizes("estimator.input_load", &given.input_load, dims.inputs)?,
     })
 }
 

@@ -16,6 +16,10 @@
 //! | `controller.output_weight`, `integral_weight`, `input_weight` | 1, 0.3 and 0.1 divided by the nominal value of the signal |
 //! | `controller.tracked` | the first outputs, as many as there are inputs |
 //! | `observer.decay` | that of the controller |
+//! | `estimator.method` | `observer`, or `reference` where `database` names a log |
+//! | `estimator.authority` | the sensor's range `max - min`; without one 2.5 times its nominal value and twice its largest operating point |
+//! | `estimator.input_load` | a fifth of the input's nominal value |
+//! | `estimator.model_error`, `fault_rate`, `fault_length`, `ambiguous` | 0.05, 1e-5 a sample, 1000 samples, `trust-sensors` |
 //! | `estimator.response_length` | until the response has decayed to 1e-7 of itself |
 //! | `estimator.threshold` | from `sigmas`, and at least a thousandth of the nominal value of the output |
 //! | `scenario.noise`, `fault` | none |
@@ -59,7 +63,7 @@ pub const FEEDFORWARD: bool = true;
 /// `observer.kind`
 pub const OBSERVER: ObserverKind = ObserverKind::Auto;
 /// `estimator.method`
-pub const ESTIMATOR: EstimatorMethod = EstimatorMethod::Reference;
+pub const ESTIMATOR: EstimatorMethod = EstimatorMethod::Observer;
 /// `estimator.database`
 pub const DATABASE: DatabaseSource = DatabaseSource::Commission;
 /// `estimator.sigmas`

@@ -235,12 +235,36 @@ pub struct Estimator {
     pub stuck_after: Option<i64>,
     /// Whether the response goes on being learned while all is well.
     pub adapt: Option<bool>,
+    /// Relative error of the entries of the plant's matrices.
+    pub model_error: Option<f64>,
+    /// Faults per sample and sensor.
+    pub fault_rate: Option<f64>,
+    /// Mean length of a fault in samples.
+    pub fault_length: Option<f64>,
+    /// Whom to believe where a slow divergence could be a sensor's drift or a load.
+    pub ambiguous: Option<Ambiguous>,
+    /// Largest correction, per sensor (number or p).
+    pub authority: Option<NumberOrList>,
+    /// Size of a load on each input (number or m).
+    pub input_load: Option<NumberOrList>,
+}
+
+/// Values of `estimator.ambiguous`.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Ambiguous {
+    /// The sensors.
+    TrustSensors,
+    /// The model.
+    TrustModel,
 }
 
 /// Values of `estimator.method`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum EstimatorMethod {
+    /// State-based: hypotheses about sensors and plant in competition.
+    Observer,
     /// Predictor from a healthy database.
     Reference,
     /// Sliding window as printed in the paper.

@@ -3,7 +3,7 @@
 use crate::running_loop;
 use crate::text::{count, number};
 use crate::warnings;
-use ftc_control::parameters::{Compensation, EstimatorMethod, ObserverKind};
+use ftc_control::parameters::{Compensation, EstimatorMethod, Hypotheses, ObserverKind};
 use ftc_design::augmented::assumes_input_disturbance;
 use ftc_design::{ControlSpec, Design, DesignError, ObserverDesign, Signal, StateFeedback};
 use serde_json::{Value, json};
@@ -151,9 +151,19 @@ fn observer(design: &Design) -> Vec<(String, String)> {
     lines
 }
 
+/// Whom the estimator believes where a slow divergence could be a drift or a load.
+fn ambiguous(settings: &Hypotheses) -> &'static str {
+    if settings.trusts_model() {
+        "the model is believed"
+    } else {
+        "the sensors are believed, suspect is raised"
+    }
+}
+
 fn estimator(design: &Design) -> Vec<(String, String)> {
     let estimator = &design.controller.estimator;
     let method = match estimator.method {
+        EstimatorMethod::Observer => "observer (hypotheses about sensors and plant in competition)",
         EstimatorMethod::Reference => "reference (predictor from a healthy database)",
         EstimatorMethod::Sliding => "sliding window as printed",
         EstimatorMethod::None => "none",
@@ -163,14 +173,33 @@ fn estimator(design: &Design) -> Vec<(String, String)> {
         return lines;
     }
     let outputs = &design.signals.outputs;
-    lines.push(line(
-        "response length",
-        format!(
-            "{} ({} s)",
-            count(estimator.response_length, "sample"),
-            number(estimator.response_length as f64 * design.plant.sample_time)
-        ),
-    ));
+    if let Some(settings) = &estimator.hypotheses {
+        lines.push(line(
+            "model error",
+            format!(
+                "{} % of each entry, assumed",
+                number(100.0 * settings.model_error)
+            ),
+        ));
+        lines.push(line(
+            "fault rate",
+            format!("{:e} a sample and sensor", settings.fault_rate),
+        ));
+        lines.push(line("slow divergence", ambiguous(settings)));
+        lines.push(line(
+            "largest correction",
+            with_units(&settings.authority, outputs),
+        ));
+    } else {
+        lines.push(line(
+            "response length",
+            format!(
+                "{} ({} s)",
+                count(estimator.response_length, "sample"),
+                number(estimator.response_length as f64 * design.plant.sample_time)
+            ),
+        ));
+    }
     for (index, predictor) in estimator.predictors.iter().enumerate() {
         lines.push(line(
             format!("mode {}", index + 1),
@@ -185,10 +214,12 @@ fn estimator(design: &Design) -> Vec<(String, String)> {
         "thresholds",
         with_units(&estimator.thresholds, outputs),
     ));
-    lines.push(line(
-        "debounce",
-        count(estimator.debounce as usize, "sample"),
-    ));
+    if estimator.hypotheses.is_none() {
+        lines.push(line(
+            "debounce",
+            count(estimator.debounce as usize, "sample"),
+        ));
+    }
     if estimator.stuck_after > 0 {
         lines.push(line(
             "stuck after",

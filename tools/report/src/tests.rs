@@ -109,6 +109,7 @@ fn lags(outputs: usize, disturbances: usize, steps: u64) -> Design {
             },
             estimator: Estimator {
                 method: EstimatorMethod::None,
+                hypotheses: None,
                 response_length: 0,
                 window: 0,
                 predictors: vec![],

@@ -41,7 +41,14 @@ impl Controller {
         self.tick(trial, sample);
         let (estimator, observer) = (&self.parameters.estimator, &self.parameters.observer);
         let screened = trial.repetition.screened();
-        trial.estimator.differentiate(estimator, mode, screened, dy);
+        if let (Some(bank), Some(judged)) = (&self.bank, &mut trial.bank) {
+            bank.differentiate(judged, dy);
+            trial
+                .estimator
+                .adopt_change(estimator, judged, screened, dy);
+        } else {
+            trial.estimator.differentiate(estimator, mode, screened, dy);
+        }
         self.differentiate_correction(trial, sample, dy);
         let corrected = &trial.corrected;
         trial
@@ -64,12 +71,16 @@ impl Controller {
             .corrected
             .iter_mut()
             .zip(trial.open_loop.contradicted());
-        for ((corrected, &overruled), ((&fault, &y), &dy)) in readings.zip(changes) {
+        let expected = trial.estimator.prediction.iter();
+        let stands_in = self.bank.is_some();
+        for (((corrected, &overruled), ((&fault, &y), &dy)), &expected) in
+            readings.zip(changes).zip(expected)
+        {
             let change = if subtracted { dy - fault } else { dy };
-            let seen = if is_measurement(y) && !(subtracted && overruled) {
-                change
-            } else {
-                0.0
+            let seen = match (is_measurement(y), stands_in) {
+                (true, _) if !(subtracted && overruled) => change,
+                (false, true) => expected,
+                _ => 0.0,
             };
             *corrected = kernel::bounded_change(*corrected, seen);
         }

@@ -1,7 +1,9 @@
 //! How residual and fault estimate follow a change of the measurement.
 
 use super::EstimatorState;
+use super::hypotheses::BankState;
 use crate::compensation::is_measurement;
+use crate::kernel;
 use crate::parameters::{Estimator, EstimatorMethod};
 
 impl EstimatorState {
@@ -26,6 +28,40 @@ impl EstimatorState {
             let follows = judged && flagged && residual.abs() < largest;
             *residual = if is_measurement(y) { slope * dy } else { 0.0 };
             *fault = if follows { *residual } else { 0.0 };
+        }
+    }
+
+    /// The same for what was taken over from the state-based estimator, whose `expected` outputs
+    /// (p) have become their changes.
+    pub(crate) fn adopt_change(
+        &mut self,
+        estimator: &Estimator,
+        bank: &BankState,
+        y: &[f64],
+        dy: &[f64],
+    ) {
+        let limits = estimator
+            .hypotheses
+            .as_ref()
+            .map_or(&estimator.largest_fault, |settings| &settings.authority);
+        kernel::copy(&mut self.prediction, &bank.expected);
+        let sensors = self
+            .residual
+            .iter_mut()
+            .zip(&mut self.fault)
+            .zip(&self.flagged);
+        let changes = y.iter().zip(dy).zip(&bank.expected).zip(limits);
+        for (((residual, fault), &flagged), (((&y, &dy), &expected), &largest)) in
+            sensors.zip(changes)
+        {
+            let change = if flagged { dy - expected } else { dy };
+            let follows = flagged && fault.abs() < largest;
+            *residual = if is_measurement(y) { change } else { 0.0 };
+            *fault = if is_measurement(y) && follows {
+                change
+            } else {
+                0.0
+            };
         }
     }
 

@@ -10,6 +10,7 @@ mod adaptation;
 mod decision;
 mod derivative;
 mod harmonics;
+pub mod hypotheses;
 mod predictor;
 mod recovery;
 mod window;
@@ -26,6 +27,7 @@ pub use window::SlidingWindow;
 use super::compensation::is_measurement;
 use super::kernel;
 use super::parameters::{Estimator, EstimatorMethod};
+use hypotheses::BankState;
 use serde::{Deserialize, Serialize};
 
 /// How many noise deviations a threshold usually is.
@@ -205,6 +207,9 @@ impl EstimatorState {
 
     /// Puts the prediction in place of `expected` outputs (p), where it can be trusted now.
     pub fn predict_into(&self, estimator: &Estimator, expected: &mut [f64]) {
+        if estimator.method == EstimatorMethod::Observer {
+            kernel::copy(expected, &self.prediction);
+        }
         if estimator.method != EstimatorMethod::Reference {
             return;
         }
@@ -225,9 +230,43 @@ impl EstimatorState {
 
     /// Whether an accused sensor has no trusted prediction to stand in for it.
     pub fn leans_on_the_model(&self, estimator: &Estimator) -> bool {
+        if estimator.method == EstimatorMethod::Observer {
+            return false;
+        }
         let predicts = estimator.method == EstimatorMethod::Reference;
         let mut sensors = self.flagged.iter().zip(&self.judged);
         sensors.any(|(&flagged, &judged)| flagged && !(predicts && judged))
+    }
+
+    /// Takes over what the state-based estimator said of the readings `y` (p).
+    pub(crate) fn adopt(&mut self, estimator: &Estimator, bank: &BankState, y: &[f64]) {
+        let limits = estimator
+            .hypotheses
+            .as_ref()
+            .map_or(&estimator.largest_fault, |settings| &settings.authority);
+        kernel::copy(&mut self.prediction, &bank.expected);
+        self.judged.fill(true);
+        let sensors = self
+            .fault
+            .iter_mut()
+            .zip(&mut self.flagged)
+            .zip(&mut self.residual);
+        let said = y.iter().zip(&bank.residual).zip(&bank.expected).zip(limits);
+        for (q, (((fault, flagged), residual), (((&y, &left), &expected), &largest))) in
+            sensors.zip(said).enumerate()
+        {
+            *flagged = hypotheses::has(bank.accused, q);
+            if !is_measurement(y) {
+                *fault = 0.0;
+                continue;
+            }
+            *residual = left;
+            *fault = if *flagged {
+                (y - expected).clamp(-largest, largest)
+            } else {
+                0.0
+            };
+        }
     }
 
     /// Judges one sample, sensor by sensor.
@@ -236,7 +275,7 @@ impl EstimatorState {
         let trust = match estimator.method {
             EstimatorMethod::Reference => self.predict(estimator, seen),
             EstimatorMethod::Sliding => self.slide(seen),
-            EstimatorMethod::None => None,
+            EstimatorMethod::Observer | EstimatorMethod::None => None,
         };
         let healthy = self.decide(estimator, seen, trust);
         let corrected = self.reconsider(estimator, seen);

@@ -1,0 +1,717 @@
+//! The competition: what may have happened, what it leaves, and who stays.
+
+use super::hypothesis::{Hypothesis, Kinds, Reading, Sensors, has};
+use super::linear::dot;
+use super::model::{Layout, ModeModel};
+use super::{Bank, BankState, FREEZING, KEEP, Live, RENEWED};
+use alloc::vec;
+use alloc::vec::Vec;
+use serde::{Deserialize, Serialize};
+
+/// How far below the best a hypothesis may fall before it is dropped, in log likelihood.
+const MARGIN: f64 = 16.0;
+/// How far the explanation without sensor faults may fall: it is never forgotten.
+const MEMORY: f64 = 25.0;
+/// Hypotheses about the same sensors.
+const ALIKE: usize = 2;
+/// Squared whitened innovation below which nothing but "all goes on" is considered.
+pub(super) const QUIET: f64 = 8.0;
+/// Price of several sensors at once, relative to that of one.
+const TOGETHER: f64 = 1.5;
+/// Price of a fault before the first sample: one sensor in a hundred.
+const AT_START: f64 = -4.6;
+/// Mean of the relative error of a sensor's wrong gain.
+const SCALE_MEAN: f64 = -0.5;
+/// Its variance.
+const SCALE_VARIANCE: f64 = 0.25;
+
+/// What may have happened since the last sample.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub(super) enum Action {
+    /// All goes on.
+    Stay,
+    /// Loads and input gains jump.
+    Load,
+    /// These sensors have a bias.
+    Accuse(Sensors),
+    /// This sensor's gain is wrong.
+    Scale(usize),
+    /// The faults of these sensors jump.
+    Change(Sensors),
+    /// These sensors have recovered.
+    Release(Sensors),
+    /// This sensor has frozen.
+    Freeze(usize),
+    /// The plant was not at rest at the start.
+    Start,
+    /// No load acts: the readings have come back to the model's own run.
+    Home,
+    /// No load acts: these sensors have drifted away from the model's own run.
+    Drift(Sensors),
+}
+
+/// One of them, and what it leaves.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub(super) struct Candidate {
+    score: f64,
+    parent: usize,
+    action: Action,
+    convinced: bool,
+}
+
+/// Room for all that may have happened.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub(super) struct Candidates {
+    list: Vec<Candidate>,
+    count: usize,
+}
+
+impl Candidates {
+    /// For `outputs` sensors.
+    pub(super) fn new(outputs: usize) -> Self {
+        let none = Candidate {
+            score: 0.0,
+            parent: 0,
+            action: Action::Stay,
+            convinced: false,
+        };
+        Self {
+            list: vec![none; super::SLOTS * (6 + 6 * outputs + outputs * outputs)],
+            count: 0,
+        }
+    }
+
+    fn add(&mut self, candidate: Candidate) {
+        if let Some(entry) = self.list.get_mut(self.count) {
+            *entry = candidate;
+            self.count += 1;
+        }
+    }
+
+    fn all(&self) -> &[Candidate] {
+        &self.list[..self.count]
+    }
+
+    fn sort(&mut self, order: impl Fn(&Candidate, &Candidate) -> core::cmp::Ordering) {
+        self.list[..self.count].sort_unstable_by(order);
+    }
+}
+
+impl crate::state::State for Candidates {
+    fn same_shape(&self, other: &Self) -> bool {
+        self.list.len() == other.list.len()
+    }
+}
+
+impl Bank {
+    /// Judges a sample that is not like the last.
+    pub(super) fn compete(&self, state: &mut BankState, model: &ModeModel, reading: Reading<'_>) {
+        state.candidates.count = 0;
+        for slot in state.live.slots() {
+            self.propose(state, slot, model, reading);
+        }
+        self.select(state);
+        self.instantiate(state, model, reading);
+    }
+
+    fn propose(&self, state: &mut BankState, slot: usize, model: &ModeModel, reading: Reading<'_>) {
+        let p = self.layout.p;
+        let all = if p >= 64 { u64::MAX } else { (1 << p) - 1 };
+        let h = &state.slots[slot];
+        let (score, accused, moving, convinced) = (h.score, h.accused(), h.moving, h.convinced);
+        let likelihood = state.seen[slot].likelihood(p);
+        let square = state.seen[slot].square;
+        let stay = score + likelihood + if moving { self.prices.settle } else { 0.0 };
+        state.candidates.add(Candidate {
+            score: stay,
+            parent: slot,
+            action: Action::Stay,
+            convinced,
+        });
+        let unlikely = square > QUIET.min(4.0 + p as f64);
+        if unlikely || moving {
+            let price = if moving {
+                self.prices.moving
+            } else {
+                self.prices.load
+            };
+            let mut value = price + self.trial(state, slot, model, reading, Action::Load);
+            if moving {
+                value = value.max(likelihood + 0.5 * square.min(1e5) - self.settings.surprise);
+            }
+            let value = score + value;
+            state.candidates.add(Candidate {
+                score: value,
+                parent: slot,
+                action: Action::Load,
+                convinced,
+            });
+        }
+        if state.first && accused == 0 {
+            let value =
+                score + self.prices.fault + self.trial(state, slot, model, reading, Action::Start);
+            state.candidates.add(Candidate {
+                score: value,
+                parent: slot,
+                action: Action::Start,
+                convinced,
+            });
+        }
+        let displaced = self.displaced(state, slot, model, reading) & reading.valid;
+        if accused == 0 && displaced != 0 && !state.first {
+            if unlikely {
+                let value = score
+                    + self.prices.fault
+                    + self.trial(state, slot, model, reading, Action::Home);
+                state.candidates.add(Candidate {
+                    score: value,
+                    parent: slot,
+                    action: Action::Home,
+                    convinced,
+                });
+            }
+            if self.settings.trusts_model() {
+                let value = self.trial(state, slot, model, reading, Action::Drift(displaced));
+                let square = state.trial.square;
+                if square < QUIET + 2.0 * p as f64 {
+                    state.candidates.add(Candidate {
+                        score: stay.max(score + value) + 1.0,
+                        parent: slot,
+                        action: Action::Drift(displaced),
+                        convinced: true,
+                    });
+                }
+            }
+        }
+        let free = all & !accused & reading.valid;
+        let fault_price = if state.first {
+            AT_START
+        } else {
+            self.prices.fault
+        };
+        let gate = |value: f64| self.settings.trusts_model() || value > stay;
+        if unlikely {
+            for q in 0..p {
+                if !has(free, q) {
+                    continue;
+                }
+                let value = score
+                    + fault_price
+                    + self.trial(state, slot, model, reading, Action::Accuse(1 << q));
+                state.candidates.add(Candidate {
+                    score: value,
+                    parent: slot,
+                    action: Action::Accuse(1 << q),
+                    convinced: convinced && gate(value),
+                });
+                let value =
+                    score + fault_price + self.trial(state, slot, model, reading, Action::Scale(q));
+                state.candidates.add(Candidate {
+                    score: value,
+                    parent: slot,
+                    action: Action::Scale(q),
+                    convinced: convinced && gate(value),
+                });
+                if p > 2 && p <= 4 {
+                    for other in 0..q {
+                        if !has(free, other) {
+                            continue;
+                        }
+                        let set = 1 << q | 1 << other;
+                        let value = score
+                            + TOGETHER * fault_price
+                            + self.trial(state, slot, model, reading, Action::Accuse(set));
+                        state.candidates.add(Candidate {
+                            score: value,
+                            parent: slot,
+                            action: Action::Accuse(set),
+                            convinced: convinced && gate(value),
+                        });
+                    }
+                }
+            }
+            if free.count_ones() > 1 {
+                let value = score
+                    + TOGETHER * fault_price
+                    + self.trial(state, slot, model, reading, Action::Accuse(free));
+                state.candidates.add(Candidate {
+                    score: value,
+                    parent: slot,
+                    action: Action::Accuse(free),
+                    convinced: convinced && gate(value),
+                });
+            }
+        }
+        for q in 0..p {
+            if has(free, q) && state.evidence[q] > FREEZING {
+                let value = score
+                    + self.prices.stuck
+                    + state.evidence[q]
+                    + self.trial(state, slot, model, reading, Action::Freeze(q));
+                state.candidates.add(Candidate {
+                    score: value,
+                    parent: slot,
+                    action: Action::Freeze(q),
+                    convinced,
+                });
+            }
+            if has(accused & reading.valid, q) {
+                if unlikely {
+                    let value = score
+                        + self.prices.change
+                        + self.trial(state, slot, model, reading, Action::Change(1 << q));
+                    state.candidates.add(Candidate {
+                        score: value,
+                        parent: slot,
+                        action: Action::Change(1 << q),
+                        convinced,
+                    });
+                }
+                let value = score
+                    + self.prices.release
+                    + self.trial(state, slot, model, reading, Action::Release(1 << q));
+                state.candidates.add(Candidate {
+                    score: value,
+                    parent: slot,
+                    action: Action::Release(1 << q),
+                    convinced: convinced || accused.count_ones() == 1,
+                });
+            }
+        }
+        if (accused & reading.valid).count_ones() > 1 {
+            let value = score
+                + TOGETHER * self.prices.release
+                + self.trial(state, slot, model, reading, Action::Release(accused));
+            state.candidates.add(Candidate {
+                score: value,
+                parent: slot,
+                action: Action::Release(accused),
+                convinced: true,
+            });
+        }
+    }
+
+    /// Log likelihood of the sample if `action` happened to the hypothesis in `slot`.
+    fn trial(
+        &self,
+        state: &mut BankState,
+        slot: usize,
+        model: &ModeModel,
+        reading: Reading<'_>,
+        action: Action,
+    ) -> f64 {
+        let layout = self.layout;
+        let Layout { n, m, p, .. } = layout;
+        let bias = self.output_error();
+        let h = &state.slots[slot];
+        let kinds = self.sets(h, action);
+        let stuck = kinds.stuck;
+        let trial = &mut state.trial;
+        trial.predict(layout, model, reading, h, kinds, bias);
+        match action {
+            Action::Load => {
+                let variance = self.settings.gain_error * self.settings.gain_error;
+                for q in 0..p {
+                    for j in 0..=q {
+                        if !has(reading.valid & !stuck, q) || !has(reading.valid & !stuck, j) {
+                            continue;
+                        }
+                        let mut sum = model.load_seen[q * p + j];
+                        for k in 0..m {
+                            sum += variance
+                                * (model.cb[q * m + k] * state.u[k])
+                                * (model.cb[j * m + k] * state.u[k]);
+                        }
+                        trial.s[q * p + j] += sum;
+                    }
+                }
+            }
+            Action::Accuse(set) | Action::Change(set) => {
+                for q in 0..p {
+                    if has(set & reading.valid, q) {
+                        trial.s[q * p + q] +=
+                            self.settings.fault_size[q] * self.settings.fault_size[q];
+                    }
+                }
+            }
+            Action::Scale(q) => {
+                // The gain opens around its mean; nothing of the old entry counts.
+                let k = layout.fault() + q;
+                let (old, output) = (h.z[k], {
+                    let c = &model.c[q * n..(q + 1) * n];
+                    model.output_offset[q]
+                        + dot(c, &h.z[..n])
+                        + dot(
+                            &model.f[q * layout.d..(q + 1) * layout.d],
+                            &h.z[n..n + layout.d],
+                        )
+                });
+                let _ = old;
+                let factor = 1.0 + SCALE_MEAN;
+                trial.r[q] = reading.y[q] - factor * output;
+                let size = layout.size();
+                for j in 0..p {
+                    if !has(reading.valid, j) {
+                        continue;
+                    }
+                    let (a, b) = if j <= q { (q, j) } else { (j, q) };
+                    let mut sum = 0.0;
+                    for (i, &c) in model.c[q * n..(q + 1) * n].iter().enumerate() {
+                        let mut inner = 0.0;
+                        if j == q {
+                            for (l, &cj) in model.c[j * n..(j + 1) * n].iter().enumerate() {
+                                inner += cj * factor * h.cov[i * size + l];
+                            }
+                        } else {
+                            inner = trial.rows[j * size + i];
+                        }
+                        sum += factor * c * inner;
+                    }
+                    trial.s[a * p + b] = sum;
+                }
+                trial.s[q * p + q] +=
+                    output * output * SCALE_VARIANCE + reading.noise[q] * reading.noise[q];
+            }
+            Action::Freeze(q) => {
+                trial.r[q] = reading.y[q] - state.mean[q];
+                for j in 0..q {
+                    trial.s[q * p + j] = 0.0;
+                }
+                for j in q + 1..p {
+                    trial.s[j * p + q] = 0.0;
+                }
+                trial.s[q * p + q] =
+                    reading.noise[q] * reading.noise[q] * (1.0 + 1.0 / state.count[q].max(1.0));
+            }
+            Action::Start => {
+                for q in 0..p {
+                    for j in 0..=q {
+                        if !has(reading.valid, q) || !has(reading.valid, j) {
+                            continue;
+                        }
+                        let mut sum = 0.0;
+                        for k in 0..n {
+                            let sd = self.settings.start_elsewhere[k];
+                            sum += model.c[q * n + k] * model.c[j * n + k] * sd * sd;
+                        }
+                        trial.s[q * p + j] += sum;
+                    }
+                }
+            }
+            Action::Home | Action::Drift(_) => {
+                let set = if let Action::Drift(set) = action {
+                    set
+                } else {
+                    0
+                };
+                for q in 0..p {
+                    for j in 0..=q {
+                        if !has(reading.valid, q) || !has(reading.valid, j) {
+                            continue;
+                        }
+                        let mut sum = 0.0;
+                        for k in 0..n {
+                            sum += model.c[q * n + k]
+                                * model.c[j * n + k]
+                                * self.own_variance(model, &state.own, k);
+                        }
+                        if q == j {
+                            sum += reading.noise[q] * reading.noise[q];
+                            if has(set, q) {
+                                sum += self.settings.fault_size[q] * self.settings.fault_size[q];
+                            }
+                        }
+                        trial.s[q * p + j] = sum;
+                    }
+                    trial.r[q] = if has(reading.valid, q) {
+                        reading.y[q] - state.own_output[q]
+                    } else {
+                        0.0
+                    };
+                }
+            }
+            Action::Stay | Action::Release(_) => {}
+        }
+        trial.whiten(p);
+        trial.likelihood(p)
+    }
+
+    /// Variance of entry `k` of the model's own run.
+    pub(super) fn own_variance(&self, model: &ModeModel, own: &[f64], k: usize) -> f64 {
+        let off = self.settings.model_error * (own[k] - model.x0[k]);
+        let start = 3.0 * self.settings.start[k];
+        off * off + start * start
+    }
+
+    fn sets(&self, h: &Hypothesis, action: Action) -> Kinds {
+        let now = h.kinds();
+        match action {
+            Action::Stay | Action::Load | Action::Start => now,
+            Action::Home => Kinds {
+                additive: 0,
+                stuck: 0,
+                scaled: 0,
+            },
+            Action::Drift(set) => Kinds {
+                additive: set,
+                stuck: 0,
+                scaled: 0,
+            },
+            Action::Accuse(set) | Action::Change(set) => {
+                let rest = now.without(set);
+                Kinds {
+                    additive: rest.additive | set,
+                    ..rest
+                }
+            }
+            Action::Release(set) => now.without(set),
+            Action::Freeze(q) => {
+                let rest = now.without(1 << q);
+                Kinds {
+                    stuck: rest.stuck | 1 << q,
+                    ..rest
+                }
+            }
+            Action::Scale(q) => {
+                let rest = now.without(1 << q);
+                Kinds {
+                    scaled: rest.scaled | 1 << q,
+                    ..rest
+                }
+            }
+        }
+    }
+
+    /// Keeps the best candidates, few of a kind, and always one without an accusation.
+    fn select(&self, state: &mut BankState) {
+        let order = |a: &Candidate, b: &Candidate| {
+            b.score.total_cmp(&a.score).then(a.parent.cmp(&b.parent))
+        };
+        state.candidates.sort(order);
+        let best = state
+            .candidates
+            .all()
+            .iter()
+            .filter(|c| c.convinced)
+            .map(|c| c.score)
+            .fold(f64::NEG_INFINITY, f64::max);
+        let mut kept = 0;
+        let mut healthy = false;
+        for index in 0..state.candidates.count {
+            let candidate = state.candidates.list[index];
+            let kinds = self.sets(&state.slots[candidate.parent], candidate.action);
+            let clean = kinds.all() == 0;
+            let protect = clean && !healthy;
+            if !protect && (candidate.score < best - MARGIN || kept >= KEEP - usize::from(!healthy))
+            {
+                continue;
+            }
+            let alike = state.candidates.list[..kept]
+                .iter()
+                .filter(|c| {
+                    self.sets(&state.slots[c.parent], c.action).all() == kinds.all()
+                        && c.convinced == candidate.convinced
+                })
+                .count();
+            if alike >= ALIKE {
+                continue;
+            }
+            healthy |= clean;
+            let mut taken = candidate;
+            taken.score = (candidate.score - best).clamp(-MEMORY, MEMORY);
+            state.candidates.list[kept] = taken;
+            kept += 1;
+        }
+        state.candidates.count = kept;
+    }
+
+    fn instantiate(&self, state: &mut BankState, model: &ModeModel, reading: Reading<'_>) {
+        let layout = self.layout;
+        let Layout { n, p, .. } = layout;
+        let bias = self.output_error();
+        let mut next = Live::NONE;
+        // Children first: they start from their parents' predictions.
+        let mut free = 0;
+        for index in 0..state.candidates.count {
+            let candidate = state.candidates.list[index];
+            if candidate.action == Action::Stay {
+                next.add(candidate.parent);
+                continue;
+            }
+            while state.live.contains(free) || next.contains(free) {
+                free += 1;
+            }
+            next.add(free);
+            let (parent, child) = pair(&mut state.slots, candidate.parent, free);
+            child.take(parent);
+            let kinds = self.sets(child, candidate.action);
+            (child.additive, child.stuck, child.scaled) =
+                (kinds.additive, kinds.stuck, kinds.scaled);
+            child.moving = candidate.action == Action::Load;
+            let fault = layout.fault();
+            match candidate.action {
+                Action::Load => child.jump(layout, model, &state.u, self.settings.gain_error),
+                Action::Accuse(set) | Action::Change(set) => {
+                    for q in 0..p {
+                        if !has(set, q) {
+                            continue;
+                        }
+                        let (k, size) = (fault + q, layout.size());
+                        let variance = self.settings.fault_size[q] * self.settings.fault_size[q];
+                        if has(parent.stuck | parent.scaled, q)
+                            || (!bias && !has(parent.additive, q))
+                        {
+                            child.open(k, 0.0, variance);
+                        } else {
+                            child.cov[k * size + k] += variance;
+                        }
+                    }
+                }
+                Action::Release(set) => {
+                    for q in 0..p {
+                        if has(set, q) {
+                            child.open(
+                                fault + q,
+                                0.0,
+                                if bias {
+                                    model.bias[q]
+                                        * self.settings.model_error
+                                        * self.settings.model_error
+                                } else {
+                                    0.0
+                                },
+                            );
+                        }
+                    }
+                }
+                Action::Freeze(q) => {
+                    let variance = reading.noise[q] * reading.noise[q] / state.count[q].max(1.0);
+                    child.open(fault + q, state.mean[q], variance);
+                }
+                Action::Scale(q) => child.open(fault + q, SCALE_MEAN, SCALE_VARIANCE),
+                Action::Start => {
+                    let size = layout.size();
+                    for (k, sd) in self.settings.start_elsewhere.iter().enumerate() {
+                        child.cov[k * size + k] += sd * sd;
+                    }
+                }
+                Action::Home | Action::Drift(_) => {
+                    let size = layout.size();
+                    for k in 0..n {
+                        let variance = self.own_variance(model, &state.own, k);
+                        child.open(k, state.own[k], variance);
+                        child.open(layout.load() + k, 0.0, 0.01 * model.load[k * n + k]);
+                        child.before[k] = state.own[k];
+                    }
+                    let _ = size;
+                    for q in 0..p {
+                        if has(child.additive, q) {
+                            child.open(
+                                fault + q,
+                                0.0,
+                                self.settings.fault_size[q] * self.settings.fault_size[q],
+                            );
+                        } else {
+                            child.open(
+                                fault + q,
+                                0.0,
+                                if bias {
+                                    model.bias[q]
+                                        * self.settings.model_error
+                                        * self.settings.model_error
+                                } else {
+                                    0.0
+                                },
+                            );
+                        }
+                    }
+                }
+                Action::Stay => {}
+            }
+            let seen = &mut state.seen[free];
+            let child = &state.slots[free];
+            seen.predict(layout, model, reading, child, child.kinds(), bias);
+            seen.whiten(p);
+        }
+        for index in 0..state.candidates.count {
+            let slot = usize::from(next.list[index]);
+            let candidate = state.candidates.list[index];
+            let h = &mut state.slots[slot];
+            h.update(layout, &mut state.seen[slot], bias);
+            h.score = candidate.score;
+            let price = match candidate.action {
+                Action::Stay | Action::Release(_) => 0.0,
+                Action::Load => {
+                    if h.moving && candidate.parent != slot {
+                        4.0
+                    } else {
+                        0.0
+                    }
+                }
+                Action::Accuse(_)
+                | Action::Scale(_)
+                | Action::Freeze(_)
+                | Action::Start
+                | Action::Home
+                | Action::Drift(_) => -2.0 * self.prices.fault,
+                Action::Change(_) => -2.0 * self.prices.change,
+            };
+            h.misfit += RENEWED * (state.seen[slot].square.min(1e3) + price - h.misfit);
+            h.convinced = candidate.convinced;
+            if candidate.action == Action::Stay {
+                h.moving = false;
+            }
+        }
+        state.live = next;
+        // Whom to believe: an accusation must beat the best explanation without one by its odds.
+        let mut best = state.live.first();
+        let mut top = f64::NEG_INFINITY;
+        let mut most = f64::NEG_INFINITY;
+        for slot in state.live.slots() {
+            let h = &state.slots[slot];
+            most = most.max(h.score);
+            let value = if h.accused() == 0 || self.settings.trusts_model() {
+                h.score
+            } else {
+                h.score - self.settings.odds
+            };
+            let fits = h.accused() == 0
+                || h.misfit < 3.0 * p as f64 + 6.0
+                    && state.seen[slot].square < 20.0 + 4.0 * p as f64;
+            if h.convinced && fits && value > top {
+                top = value;
+                best = slot;
+            }
+        }
+        state.best = best;
+        state.suspect = 0;
+        let decided = state.slots[best].accused();
+        for slot in state.live.slots() {
+            let h = &state.slots[slot];
+            if h.score < state.slots[best].score {
+                continue;
+            }
+            for q in 0..p {
+                if has(h.accused() & !decided, q)
+                    && (!has(h.additive, q)
+                        || h.z[layout.fault() + q].abs() > 6.0 * reading.noise[q])
+                {
+                    state.suspect |= 1 << q;
+                }
+            }
+        }
+        // The best leads.
+        state.live.lead(best);
+    }
+}
+
+/// Two different slots at once.
+fn pair(slots: &mut [Hypothesis], from: usize, to: usize) -> (&Hypothesis, &mut Hypothesis) {
+    if from < to {
+        let (a, b) = slots.split_at_mut(to);
+        (&a[from], &mut b[0])
+    } else {
+        let (a, b) = slots.split_at_mut(from);
+        (&b[0], &mut a[to])
+    }
+}

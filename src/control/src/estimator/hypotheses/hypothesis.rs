@@ -1,0 +1,594 @@
+//! One hypothesis: who is faulty, and a Kalman filter of `[x; d; l; g; f]` under that assumption.
+
+use super::linear::{axpy, dot, factor, solve};
+use super::model::{Layout, ModeModel};
+use crate::kernel::bounded;
+use crate::parameters::Hypotheses as Settings;
+use alloc::vec;
+use alloc::vec::Vec;
+use serde::{Deserialize, Serialize};
+
+/// A set of sensors, as bits.
+pub type Sensors = u64;
+
+/// Whether sensor `q` is in the set.
+pub const fn has(set: Sensors, q: usize) -> bool {
+    q < 64 && set >> q & 1 == 1
+}
+
+/// One hypothesis.
+#[derive(Debug, PartialEq, Serialize, Deserialize)]
+pub struct Hypothesis {
+    /// Estimate of the joint state (N).
+    pub z: Vec<f64>,
+    /// Its covariance (N x N).
+    pub cov: Vec<f64>,
+    /// Estimate of the state a sample ago (n).
+    pub before: Vec<f64>,
+    /// Sensors with an additive fault.
+    pub additive: Sensors,
+    /// Sensors that repeat one value.
+    pub stuck: Sensors,
+    /// Sensors whose gain is wrong.
+    pub scaled: Sensors,
+    /// Whether what accuses its sensors could be nothing else.
+    pub convinced: bool,
+    /// Whether its loads move now.
+    pub moving: bool,
+    /// Logarithm of its probability, up to a constant.
+    pub score: f64,
+    /// Running mean of how badly it fits.
+    pub misfit: f64,
+}
+
+/// What a sample says under a hypothesis.
+#[derive(Debug, PartialEq, Serialize, Deserialize)]
+pub struct Innovation {
+    /// `y - y_hat` (p).
+    pub r: Vec<f64>,
+    /// `C P` (p x N).
+    pub rows: Vec<f64>,
+    /// Its covariance, then its Cholesky factor (p x p).
+    pub s: Vec<f64>,
+    /// Weights of the output and of the fault in each reading (p).
+    pub weights: Vec<[f64; 2]>,
+    /// Whitened innovation (p).
+    pub white: Vec<f64>,
+    /// `r' S^-1 r`.
+    pub square: f64,
+    /// Whether the covariance could be factored.
+    pub sound: bool,
+}
+
+/// One sample.
+#[derive(Clone, Copy, Debug)]
+pub struct Reading<'a> {
+    /// Measurement (p).
+    pub y: &'a [f64],
+    /// Sensors whose reading carries information.
+    pub valid: Sensors,
+    /// Noise deviation (p).
+    pub noise: &'a [f64],
+}
+
+crate::state!(Hypothesis {
+    parts: [z, cov, before],
+    constants: [],
+    counters: [additive, stuck, scaled, convinced, moving, score, misfit]
+});
+crate::state!(Innovation {
+    parts: [r, rows, s, weights, white],
+    constants: [],
+    counters: [square, sound]
+});
+
+impl Innovation {
+    /// Room for `layout`.
+    pub fn new(layout: Layout) -> Self {
+        let p = layout.p;
+        Self {
+            r: vec![0.0; p],
+            rows: vec![0.0; p * layout.size()],
+            s: vec![0.0; p * p],
+            weights: vec![[1.0, 0.0]; p],
+            white: vec![0.0; p],
+            square: 0.0,
+            sound: true,
+        }
+    }
+
+    /// Innovation of `h` if its faulty sensors were those of `kinds`.
+    pub fn predict(
+        &mut self,
+        layout: Layout,
+        model: &ModeModel,
+        reading: Reading<'_>,
+        h: &Hypothesis,
+        kinds: Kinds,
+        bias: bool,
+    ) {
+        let Layout { n, p, d, .. } = layout;
+        let (size, fault) = (layout.size(), layout.fault());
+        let active = if bias || kinds.all() | h.accused() != 0 {
+            size
+        } else {
+            fault
+        };
+        for q in 0..p {
+            let row = &mut self.rows[q * size..q * size + active];
+            row.fill(0.0);
+            self.s[q * p..q * p + q].fill(0.0);
+            if !has(reading.valid, q) {
+                self.r[q] = 0.0;
+                self.s[q * p + q] = 1.0;
+                continue;
+            }
+            let noise = reading.noise[q];
+            let k = fault + q;
+            let c = &model.c[q * n..(q + 1) * n];
+            let f = &model.f[q * d..(q + 1) * d];
+            let output = model.output_offset[q] + dot(c, &h.z[..n]) + dot(f, &h.z[n..n + d]);
+            let (scale, slot) = kinds.weights(q, output, h.z[k], bias);
+            if scale != 0.0 {
+                for (j, &factor) in c.iter().enumerate() {
+                    axpy(row, scale * factor, &h.cov[j * size..j * size + active]);
+                }
+                for (j, &factor) in f.iter().enumerate() {
+                    if factor != 0.0 {
+                        axpy(
+                            row,
+                            scale * factor,
+                            &h.cov[(n + j) * size..(n + j) * size + active],
+                        );
+                    }
+                }
+            }
+            if slot != 0.0 {
+                axpy(row, slot, &h.cov[k * size..k * size + active]);
+            }
+            self.r[q] = reading.y[q]
+                - if has(kinds.scaled, q) {
+                    scale * output
+                } else {
+                    scale * output + slot * h.z[k]
+                };
+            self.weights[q] = [scale, slot];
+            let row = &self.rows[q * size..q * size + active];
+            for j in 0..=q {
+                let mut sum = 0.0;
+                if has(reading.valid, j) {
+                    let [scale, slot] = self.weights[j];
+                    if scale != 0.0 {
+                        sum = scale
+                            * (dot(&model.c[j * n..(j + 1) * n], &row[..n])
+                                + dot(&model.f[j * d..(j + 1) * d], &row[n..n + d]));
+                    }
+                    if slot != 0.0 {
+                        sum += slot * row[fault + j];
+                    }
+                }
+                self.s[q * p + j] = sum;
+            }
+            self.s[q * p + q] += noise * noise;
+        }
+    }
+
+    /// Factors the covariance, whitens the innovation.
+    pub fn whiten(&mut self, p: usize) {
+        self.sound = factor(&mut self.s, p);
+        if !self.sound {
+            self.white.fill(0.0);
+            self.square = 1e300;
+            return;
+        }
+        self.white.copy_from_slice(&self.r);
+        solve(&self.s, p, &mut self.white);
+        self.square = dot(&self.white, &self.white);
+        if !self.square.is_finite() {
+            self.square = 1e300;
+        }
+    }
+
+    /// Logarithm of the likelihood, after [`whiten`](Self::whiten).
+    pub fn likelihood(&self, p: usize) -> f64 {
+        if !self.sound {
+            return -1e5;
+        }
+        let mut product = 1.0;
+        let mut log = 0.0;
+        for q in 0..p {
+            product *= self.s[q * p + q];
+            if !(1e-100..1e100).contains(&product) {
+                log += libm::log(product);
+                product = 1.0;
+            }
+        }
+        log += libm::log(product);
+        (-0.5 * self.square.min(1e5) - log).max(-1e6)
+    }
+}
+
+/// Who is faulty, and how.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Kinds {
+    pub additive: Sensors,
+    pub stuck: Sensors,
+    pub scaled: Sensors,
+}
+
+impl Kinds {
+    pub const fn all(self) -> Sensors {
+        self.additive | self.stuck | self.scaled
+    }
+    pub const fn without(self, set: Sensors) -> Self {
+        Self {
+            additive: self.additive & !set,
+            stuck: self.stuck & !set,
+            scaled: self.scaled & !set,
+        }
+    }
+    /// Weights of the output and of the fault's entry in the reading of sensor `q`.
+    fn weights(self, q: usize, output: f64, fault: f64, bias: bool) -> (f64, f64) {
+        if has(self.stuck, q) {
+            (0.0, 1.0)
+        } else if has(self.scaled, q) {
+            (1.0 + fault, output)
+        } else if bias || has(self.additive, q) {
+            (1.0, 1.0)
+        } else {
+            (1.0, 0.0)
+        }
+    }
+}
+
+impl Hypothesis {
+    /// Who is faulty, and how.
+    pub const fn kinds(&self) -> Kinds {
+        Kinds {
+            additive: self.additive,
+            stuck: self.stuck,
+            scaled: self.scaled,
+        }
+    }
+    /// Nothing but the start.
+    pub fn new(layout: Layout) -> Self {
+        let size = layout.size();
+        Self {
+            z: vec![0.0; size],
+            cov: vec![0.0; size * size],
+            before: vec![0.0; layout.n],
+            additive: 0,
+            stuck: 0,
+            scaled: 0,
+            convinced: true,
+            moving: false,
+            score: 0.0,
+            misfit: layout.p as f64,
+        }
+    }
+
+    /// Everyone accused.
+    pub const fn accused(&self) -> Sensors {
+        self.additive | self.stuck | self.scaled
+    }
+
+    /// Copies in place.
+    pub fn take(&mut self, other: &Self) {
+        self.z.copy_from_slice(&other.z);
+        self.cov.copy_from_slice(&other.cov);
+        self.before.copy_from_slice(&other.before);
+        self.additive = other.additive;
+        self.stuck = other.stuck;
+        self.scaled = other.scaled;
+        self.convinced = other.convinced;
+        self.moving = other.moving;
+        self.score = other.score;
+        self.misfit = other.misfit;
+    }
+
+    /// How many entries of the state are in use.
+    pub fn active(&self, layout: Layout, bias: bool) -> usize {
+        if bias || self.accused() != 0 {
+            layout.size()
+        } else {
+            layout.fault()
+        }
+    }
+
+    /// Forgets entry `k` and opens it with `variance` around `mean`.
+    pub fn open(&mut self, k: usize, mean: f64, variance: f64) {
+        let size = self.z.len();
+        self.cov[k * size..(k + 1) * size].fill(0.0);
+        for row in self.cov.chunks_exact_mut(size) {
+            row[k] = 0.0;
+        }
+        self.cov[k * size + k] = variance;
+        self.z[k] = mean;
+    }
+
+    /// Kalman update; `seen` is spent.
+    pub fn update(&mut self, layout: Layout, seen: &mut Innovation, bias: bool) {
+        if !seen.sound {
+            return;
+        }
+        let (p, size) = (layout.p, layout.size());
+        let active = self.active(layout, bias);
+        for i in 0..p {
+            let (done, rest) = seen.rows.split_at_mut(i * size);
+            let row = &mut rest[..active];
+            for j in 0..i {
+                axpy(row, -seen.s[i * p + j], &done[j * size..j * size + active]);
+            }
+            let scale = 1.0 / seen.s[i * p + i];
+            row.iter_mut().for_each(|v| *v *= scale);
+            let white = seen.white[i];
+            axpy(&mut self.z[..active], white, row);
+            for k in 0..active {
+                let factor = -row[k];
+                if factor != 0.0 {
+                    axpy(&mut self.cov[k * size..k * size + active], factor, row);
+                }
+            }
+        }
+        for v in &mut self.z {
+            *v = bounded(*v);
+        }
+    }
+
+    /// One sample on under the input `u` (m), which moved by `du` (m). `scratch` holds n x N.
+    #[allow(clippy::too_many_arguments)]
+    pub fn advance(
+        &mut self,
+        layout: Layout,
+        model: &ModeModel,
+        settings: &Settings,
+        noise: &[f64],
+        rotation: &[(f64, f64)],
+        bias: bool,
+        u: &[f64],
+        du: &[f64],
+        scratch: &mut [f64],
+    ) {
+        let Layout { n, m, p, d } = layout;
+        let (size, load, gain, fault) =
+            (layout.size(), layout.load(), layout.gain(), layout.fault());
+        let active = self.active(layout, bias);
+        let error = settings.model_error * settings.model_error;
+        let walk = settings.load_walk * settings.load_walk;
+        // The model's error acts as a load that moves as the state and the input move.
+        let (moved, _) = scratch.split_at_mut(n);
+        for ((out, before), &x) in moved.iter_mut().zip(&mut self.before).zip(&self.z) {
+            let step = x - *before;
+            *out = step * step;
+            *before = x;
+        }
+        for i in 0..n {
+            let mut sum = 0.0;
+            for (&a, &s) in model.a[i * n..(i + 1) * n].iter().zip(moved.iter()) {
+                sum += a * a * s;
+            }
+            for (&b, &s) in model.b[i * m..(i + 1) * m].iter().zip(du) {
+                sum += b * b * s * s;
+            }
+            let k = load + i;
+            self.cov[k * size + k] += error * sum + walk * model.load[i * n + i];
+        }
+        for k in gain..fault {
+            self.cov[k * size + k] += settings.gain_walk * settings.gain_walk;
+        }
+        for pair in 0..d / 2 {
+            let angle = settings.angles[pair % settings.angles.len()];
+            let k = n + 2 * pair;
+            let size_squared =
+                settings.disturbance_size[2 * pair] * settings.disturbance_size[2 * pair];
+            let amplitude = self.z[k] * self.z[k] + self.z[k + 1] * self.z[k + 1];
+            let step = settings.period_error * angle;
+            let variance = step * step * amplitude + 1e-8 * size_squared;
+            for k in [k, k + 1] {
+                self.cov[k * size + k] += variance;
+            }
+        }
+        if bias {
+            for q in 0..p {
+                let mut sum = 0.0;
+                for (&c, &s) in model.c[q * n..(q + 1) * n].iter().zip(moved.iter()) {
+                    sum += c * c * s;
+                }
+                let k = fault + q;
+                self.cov[k * size + k] += error * sum;
+            }
+        }
+        // Rows of F P that belong to x.
+        for i in 0..n {
+            let row = &mut scratch[i * size..i * size + active];
+            row.fill(0.0);
+            for (j, &factor) in model.a[i * n..(i + 1) * n].iter().enumerate() {
+                axpy(row, factor, &self.cov[j * size..j * size + active]);
+            }
+            for (j, &factor) in model.e[i * d..(i + 1) * d].iter().enumerate() {
+                if factor != 0.0 {
+                    axpy(
+                        row,
+                        factor,
+                        &self.cov[(n + j) * size..(n + j) * size + active],
+                    );
+                }
+            }
+            axpy(
+                row,
+                1.0,
+                &self.cov[(load + i) * size..(load + i) * size + active],
+            );
+            for (j, (&b, &u)) in model.b[i * m..(i + 1) * m].iter().zip(u).enumerate() {
+                let factor = b * u;
+                if factor != 0.0 {
+                    axpy(
+                        row,
+                        factor,
+                        &self.cov[(gain + j) * size..(gain + j) * size + active],
+                    );
+                }
+            }
+        }
+        // Their products with F'.
+        for i in 0..n {
+            let row = &scratch[i * size..i * size + active];
+            for j in 0..=i {
+                let mut sum = dot(&row[..n], &model.a[j * n..(j + 1) * n])
+                    + dot(&row[n..n + d], &model.e[j * d..(j + 1) * d])
+                    + row[load + j];
+                for ((&r, &b), &u) in row[gain..fault]
+                    .iter()
+                    .zip(&model.b[j * m..(j + 1) * m])
+                    .zip(u)
+                {
+                    sum += r * b * u;
+                }
+                self.cov[i * size + j] = sum;
+                self.cov[j * size + i] = sum;
+            }
+            for k in n..active {
+                self.cov[i * size + k] = row[k];
+                self.cov[k * size + i] = row[k];
+            }
+            let k = i * size + i;
+            self.cov[k] += 1e-12 * settings.start_elsewhere[i] * settings.start_elsewhere[i];
+        }
+        // The state.
+        for i in 0..n {
+            let mut sum = model.state_offset[i]
+                + self.z[load + i]
+                + dot(&model.a[i * n..(i + 1) * n], &self.z[..n])
+                + dot(&model.e[i * d..(i + 1) * d], &self.z[n..n + d]);
+            for ((&b, &u), &g) in model.b[i * m..(i + 1) * m]
+                .iter()
+                .zip(u)
+                .zip(&self.z[gain..fault])
+            {
+                sum += b * u * (1.0 + g);
+            }
+            scratch[i] = bounded(sum);
+        }
+        self.z[..n].copy_from_slice(&scratch[..n]);
+        self.rotate(layout, rotation, active);
+        let share = if self.convinced && !settings.trusts_model() {
+            settings.fault_walk
+        } else {
+            settings.drift_walk
+        };
+        for q in 0..p {
+            let k = fault + q;
+            if has(self.additive, q) {
+                self.cov[k * size + k] += share * share * noise[q] * noise[q];
+            }
+            if has(self.scaled, q) {
+                self.cov[k * size + k] += 1e-6;
+            }
+        }
+        self.limit(layout, model, settings, active);
+    }
+
+    fn rotate(&mut self, layout: Layout, rotation: &[(f64, f64)], active: usize) {
+        let size = layout.size();
+        for (h, &(c, s)) in rotation.iter().enumerate() {
+            let k = layout.n + 2 * h;
+            let (a, b) = (self.z[k], self.z[k + 1]);
+            self.z[k] = c * a + s * b;
+            self.z[k + 1] = c * b - s * a;
+            let (above, below) = self.cov.split_at_mut((k + 1) * size);
+            for (a, b) in above[k * size..k * size + active]
+                .iter_mut()
+                .zip(&mut below[..active])
+            {
+                let (x, y) = (*a, *b);
+                *a = c * x + s * y;
+                *b = c * y - s * x;
+            }
+            for row in self.cov.chunks_exact_mut(size).take(active) {
+                let (x, y) = (row[k], row[k + 1]);
+                row[k] = c * x + s * y;
+                row[k + 1] = c * y - s * x;
+            }
+            let mean = 0.5 * (self.cov[k * size + k + 1] + self.cov[(k + 1) * size + k]);
+            self.cov[k * size + k + 1] = mean;
+            self.cov[(k + 1) * size + k] = mean;
+        }
+    }
+
+    /// Keeps every variance below what is thought possible.
+    fn limit(&mut self, layout: Layout, model: &ModeModel, settings: &Settings, active: usize) {
+        let Layout { n, d, .. } = layout;
+        let (size, load, gain, fault) =
+            (layout.size(), layout.load(), layout.gain(), layout.fault());
+        for k in 0..active {
+            let most = if k < n {
+                1e8 * settings.start_elsewhere[k] * settings.start_elsewhere[k]
+            } else if k < n + d {
+                settings.disturbance_size[k - n] * settings.disturbance_size[k - n]
+            } else if k < gain {
+                let i = k - load;
+                4.0 * model.load[i * n + i]
+            } else if k < fault {
+                settings.gain_error * settings.gain_error
+            } else if has(self.accused(), k - fault) {
+                2.0 * settings.fault_size[k - fault] * settings.fault_size[k - fault]
+            } else {
+                model.bias[k - fault] * settings.model_error * settings.model_error
+            };
+            let variance = self.cov[k * size + k];
+            if (0.0..=most).contains(&variance) {
+                continue;
+            }
+            if !(variance > most) {
+                // Cancellation has spoilt it: start anew.
+                let fresh = if k < n {
+                    settings.start_elsewhere[k] * settings.start_elsewhere[k]
+                } else {
+                    most
+                };
+                let mean = self.z[k];
+                self.open(k, mean, fresh);
+                continue;
+            }
+            let scale = if variance.is_finite() {
+                libm::sqrt(most / variance)
+            } else {
+                0.0
+            };
+            for j in 0..active {
+                let v = self.cov[k * size + j] * scale;
+                let v = if v.is_finite() { v } else { 0.0 };
+                self.cov[k * size + j] = v;
+                self.cov[j * size + k] = v;
+            }
+            self.cov[k * size + k] = most;
+        }
+    }
+
+    /// The loads jump: `load` and the input gains, with effect on the state at once.
+    pub fn jump(&mut self, layout: Layout, model: &ModeModel, u: &[f64], gain_error: f64) {
+        let Layout { n, m, .. } = layout;
+        let (size, load, gain) = (layout.size(), layout.load(), layout.gain());
+        for i in 0..n {
+            for j in 0..n {
+                let v = model.load[i * n + j];
+                self.cov[i * size + j] += v;
+                self.cov[i * size + load + j] += v;
+                self.cov[(load + i) * size + j] += v;
+                self.cov[(load + i) * size + load + j] += v;
+            }
+        }
+        for k in 0..m {
+            let variance = gain_error * gain_error;
+            self.cov[(gain + k) * size + gain + k] += variance;
+            for i in 0..n {
+                let left = model.b[i * m + k] * u[k];
+                self.cov[i * size + gain + k] += variance * left;
+                self.cov[(gain + k) * size + i] += variance * left;
+                for j in 0..n {
+                    self.cov[i * size + j] += variance * left * (model.b[j * m + k] * u[k]);
+                }
+            }
+        }
+    }
+}

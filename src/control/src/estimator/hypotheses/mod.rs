@@ -1,0 +1,463 @@
+//! The state-based fault estimator: hypotheses in competition by likelihood, each with its price.
+//!
+//! One Kalman filter of the joint state `[x; d; l; g; f]` stands for each hypothesis: plant state,
+//! periodic disturbance, loads on the state, relative errors of the input gains, sensor faults. A
+//! sample may mean that all goes on, that a load or an input gain jumped, that sensors failed (by a
+//! bias, a wrong gain, a frozen value), changed their fault, or recovered. Each of these has a
+//! probability per sample, and the likelihood of the readings decides between what they leave.
+//!
+//! An accusation counts where a sensor's reading left what is expected of it within one sample, or
+//! repeats one value while the model moves, and where it beats the best explanation without one by
+//! given odds. What grows slowly can be a load or a sensor's drift: `suspect` names the sensors, and
+//! the policy decides. Where no hypothesis fits, the sensors are believed and `model_valid` is false.
+
+mod competition;
+mod hypothesis;
+mod linear;
+mod model;
+mod start;
+
+use alloc::vec::Vec;
+pub use hypothesis::{Hypothesis, Reading, Sensors, has};
+pub use model::Layout;
+
+use super::super::parameters::Hypotheses;
+use crate::compensation::is_measurement;
+use competition::{Candidates, QUIET};
+use hypothesis::Innovation;
+use linear::dot;
+use model::ModeModel;
+use serde::{Deserialize, Serialize};
+
+/// Most hypotheses that stay after a sample.
+const KEEP: usize = 8;
+/// Most hypotheses that may exist while a sample is judged.
+const SLOTS: usize = 2 * KEEP;
+/// How many noise deviations a threshold is.
+const SIGMAS: f64 = 6.0;
+/// Evidence of a frozen sensor from which it is considered, in log likelihood.
+const FREEZING: f64 = 4.0;
+/// Noise deviations (squared) from which loads are said to have moved an output.
+const DISPLACED: f64 = 36.0;
+/// Memory of the running misfit: its share that a sample renews.
+const RENEWED: f64 = 0.1;
+
+/// The estimator: immutable, shared by any number of [`BankState`]s.
+#[derive(Clone, Debug)]
+pub struct Bank {
+    layout: Layout,
+    modes: Vec<ModeModel>,
+    settings: Hypotheses,
+    rotation: Vec<(f64, f64)>,
+    prices: Prices,
+}
+
+/// Logarithms of the probabilities per sample.
+#[derive(Clone, Copy, Debug)]
+struct Prices {
+    fault: f64,
+    stuck: f64,
+    release: f64,
+    change: f64,
+    load: f64,
+    moving: f64,
+    settle: f64,
+}
+
+/// The slots in use, the leading hypothesis first.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+struct Live {
+    list: [u8; SLOTS],
+    count: usize,
+}
+
+impl Live {
+    const ONE: Self = Self {
+        list: [0; SLOTS],
+        count: 1,
+    };
+    const NONE: Self = Self {
+        list: [0; SLOTS],
+        count: 0,
+    };
+
+    fn slots(self) -> impl Iterator<Item = usize> {
+        self.list.into_iter().take(self.count).map(usize::from)
+    }
+
+    fn first(self) -> usize {
+        usize::from(self.list[0])
+    }
+
+    fn contains(self, slot: usize) -> bool {
+        self.slots().any(|s| s == slot)
+    }
+
+    fn add(&mut self, slot: usize) {
+        if let Some(entry) = self.list.get_mut(self.count) {
+            *entry = slot as u8;
+            self.count += 1;
+        }
+    }
+
+    fn lead(&mut self, slot: usize) {
+        if let Some(at) = self.slots().position(|s| s == slot) {
+            self.list.swap(0, at);
+        }
+    }
+
+    /// Whether every slot exists, and each once.
+    fn sound(self) -> bool {
+        let mut seen = [false; SLOTS];
+        (1..=SLOTS).contains(&self.count)
+            && self.slots().all(|s| {
+                seen.get_mut(s)
+                    .is_some_and(|seen| !core::mem::replace(seen, true))
+            })
+    }
+}
+
+/// What changes at run time.
+#[derive(Debug, PartialEq, Serialize, Deserialize)]
+pub struct BankState {
+    slots: Vec<Hypothesis>,
+    seen: Vec<Innovation>,
+    live: Live,
+    candidates: Candidates,
+    scratch: Vec<f64>,
+    trial: Innovation,
+    mode: Option<usize>,
+    /// The input that acted last (m), and how it moved (m).
+    u: Vec<f64>,
+    moved: Vec<f64>,
+    first: bool,
+    /// Noise deviation of each sensor (p).
+    noise: Vec<f64>,
+    /// Evidence that a sensor repeats one value, that value's mean, and of how many samples (p each).
+    evidence: Vec<f64>,
+    mean: Vec<f64>,
+    count: Vec<f64>,
+    best: usize,
+    /// Running mean of the leading hypothesis's squared whitened innovation.
+    misfit: f64,
+    /// The model's own run under the input alone (n), and its outputs (p).
+    own: Vec<f64>,
+    own_output: Vec<f64>,
+    /// Outputs that the leading hypothesis expects of healthy sensors (p).
+    pub expected: Vec<f64>,
+    /// What the readings leave unexplained; of an accused sensor its fault (p).
+    pub residual: Vec<f64>,
+    /// Sensors whose reading is not used.
+    pub accused: Sensors,
+    /// Sensors whose slow divergence could be a fault.
+    pub suspect: Sensors,
+    /// Whether the model explains the readings.
+    pub model_valid: bool,
+    /// What acts on the plant beside the command, as an input (m).
+    pub load: Vec<f64>,
+    /// Inputs on which that exceeds the size of a usual load, as bits.
+    pub actuator_fault: u64,
+}
+
+crate::state!(BankState {
+    parts: [
+        slots, seen, candidates, scratch, trial, u, moved, noise, evidence, mean, count, own,
+        own_output, expected, residual, load
+    ],
+    constants: [],
+    counters: [
+        live,
+        mode,
+        first,
+        best,
+        misfit,
+        accused,
+        suspect,
+        model_valid,
+        actuator_fault
+    ]
+});
+
+impl Bank {
+    /// Judges the readings `y` (p) of a sample taken in `mode`; what is no measurement tells nothing.
+    /// The noise of each sensor follows from its threshold.
+    pub fn observe(&self, state: &mut BankState, mode: usize, y: &[f64], thresholds: &[f64]) {
+        let mut noise = core::mem::take(&mut state.noise);
+        for (deviation, &threshold) in noise.iter_mut().zip(thresholds) {
+            *deviation = (threshold.abs() / SIGMAS).clamp(1e-150, 1e100);
+        }
+        let mut valid = 0;
+        for (q, &value) in y.iter().enumerate().take(Sensors::BITS as usize) {
+            valid |= Sensors::from(is_measurement(value)) << q;
+        }
+        self.judge(
+            state,
+            mode,
+            Reading {
+                y,
+                valid,
+                noise: &noise,
+            },
+        );
+        state.noise = noise;
+    }
+
+    fn judge(&self, state: &mut BankState, mode: usize, reading: Reading<'_>) {
+        let layout = self.layout;
+        let p = layout.p;
+        let model = &self.modes[mode];
+        if state.mode.is_some_and(|old| old != mode) {
+            self.enter(state, mode);
+        }
+        state.mode = Some(mode);
+        let bias = self.output_error();
+        self.run_alone(state, model);
+        for slot in state.live.slots() {
+            let h = &state.slots[slot];
+            let seen = &mut state.seen[slot];
+            seen.predict(layout, model, reading, h, h.kinds(), bias);
+        }
+        let alone = state.live.count == 1;
+        let head = state.live.first();
+        self.watch(state, head, reading);
+        for slot in state.live.slots() {
+            state.seen[slot].whiten(p);
+        }
+        let h = &state.slots[head];
+        let calm = alone
+            && h.accused() == 0
+            && !h.moving
+            && state.seen[head].square < QUIET + 2.0 * p as f64
+            && state.seen[head].sound
+            && state.evidence.iter().all(|&e| e < FREEZING)
+            && !state.first
+            && !(self.settings.trusts_model() && state.suspect != 0);
+        if calm {
+            state.slots[head].update(layout, &mut state.seen[head], bias);
+            let h = &mut state.slots[head];
+            h.score = 0.0;
+            h.misfit += RENEWED * (state.seen[head].square - h.misfit);
+            state.best = head;
+            state.suspect = 0;
+        } else {
+            self.compete(state, model, reading);
+        }
+        state.first = false;
+        let displaced = self.displaced(state, state.best, model, reading);
+        state.suspect |= displaced & !state.slots[state.best].accused();
+        self.conclude(state, model, reading);
+    }
+
+    /// Another mode: what the model misses, and what a load does, may differ.
+    fn enter(&self, state: &mut BankState, mode: usize) {
+        let Layout { n, m, .. } = self.layout;
+        let (size, load) = (self.layout.size(), self.layout.load());
+        let model = &self.modes[mode];
+        let error = self.settings.model_error * self.settings.model_error;
+        for slot in state.live.slots() {
+            let h = &mut state.slots[slot];
+            let mean = dot(&h.z[load..load + n], &h.z[load..load + n]) / n.max(1) as f64;
+            for i in 0..n {
+                let off = h.z[i] - model.x0[i];
+                h.cov[i * size + i] += error * off * off;
+                let mut sum = 0.0;
+                for j in 0..n {
+                    let v = model.a[i * n + j] * (h.z[j] - model.x0[j]);
+                    sum += v * v;
+                }
+                for j in 0..m {
+                    let v = model.b[i * m + j] * (state.u[j] - model.u0[j]);
+                    sum += v * v;
+                }
+                let k = load + i;
+                h.cov[k * size + k] += error * sum + 2.0 * (h.z[k] * h.z[k]).max(mean);
+            }
+        }
+    }
+
+    /// Outputs of the model's own run, with the disturbance as it is known.
+    fn run_alone(&self, state: &mut BankState, model: &ModeModel) {
+        let Layout { n, p, d, .. } = self.layout;
+        let z = &state.slots[state.best].z;
+        for q in 0..p {
+            state.own_output[q] = model.output_offset[q]
+                + dot(&model.c[q * n..(q + 1) * n], &state.own)
+                + dot(&model.f[q * d..(q + 1) * d], &z[n..n + d]);
+        }
+    }
+
+    /// Which sensors repeat one value while the model moves.
+    fn watch(&self, state: &mut BankState, head: usize, reading: Reading<'_>) {
+        let p = self.layout.p;
+        let (h, seen) = (&state.slots[head], &state.seen[head]);
+        for q in 0..p {
+            if !has(reading.valid, q) || has(h.stuck, q) {
+                state.evidence[q] = 0.0;
+                state.count[q] = 0.0;
+                continue;
+            }
+            let y = reading.y[q];
+            let variance = reading.noise[q] * reading.noise[q];
+            if state.count[q] == 0.0 {
+                state.mean[q] = y;
+                state.count[q] = 1.0;
+                state.evidence[q] = 0.0;
+                continue;
+            }
+            let off = y - state.mean[q];
+            let s = seen.s[q * p + q];
+            let gain = 0.5 * (seen.r[q] * seen.r[q] / s).min(50.0)
+                - 0.5 * off * off / (variance * (1.0 + 1.0 / state.count[q]))
+                - 0.02;
+            state.evidence[q] += gain;
+            if state.evidence[q] <= 0.0 {
+                state.evidence[q] = 0.0;
+                state.mean[q] = y;
+                state.count[q] = 1.0;
+            } else {
+                state.count[q] += 1.0;
+                state.mean[q] += off / state.count[q].min(200.0);
+            }
+        }
+    }
+
+    /// Sensors that loads have moved away from the model's own run.
+    fn displaced(
+        &self,
+        state: &BankState,
+        slot: usize,
+        model: &ModeModel,
+        reading: Reading<'_>,
+    ) -> Sensors {
+        let Layout { n, p, d, .. } = self.layout;
+        let z = &state.slots[slot].z;
+        let mut set = 0;
+        for q in 0..p.min(64) {
+            let output = model.output_offset[q]
+                + dot(&model.c[q * n..(q + 1) * n], &z[..n])
+                + dot(&model.f[q * d..(q + 1) * d], &z[n..n + d]);
+            let mut variance = reading.noise[q] * reading.noise[q];
+            for k in 0..n {
+                let c = model.c[q * n + k];
+                variance += c * c * self.own_variance(model, &state.own, k);
+            }
+            let off = output - state.own_output[q];
+            if off * off > DISPLACED * variance {
+                set |= 1 << q;
+            }
+        }
+        set
+    }
+
+    fn conclude(&self, state: &mut BankState, model: &ModeModel, reading: Reading<'_>) {
+        let layout = self.layout;
+        let Layout { n, p, d, .. } = layout;
+        let h = &state.slots[state.best];
+        for q in 0..p {
+            state.expected[q] = model.output_offset[q]
+                + dot(&model.c[q * n..(q + 1) * n], &h.z[..n])
+                + dot(&model.f[q * d..(q + 1) * d], &h.z[n..n + d]);
+        }
+        let all = if p >= 64 { u64::MAX } else { (1 << p) - 1 };
+        state.accused = h.accused() | (all & !reading.valid);
+        for q in 0..p {
+            state.residual[q] = if has(h.accused(), q) {
+                reading.y[q] - state.expected[q]
+            } else {
+                state.seen[state.best].r[q]
+            };
+        }
+        state.misfit += RENEWED * (state.seen[state.best].square.min(1e3) - state.misfit);
+        state.model_valid = state.misfit < 4.0 * p as f64 && !h.moving;
+        self.find_load(state, model);
+        state.actuator_fault = 0;
+        for (j, (load, size)) in state.load.iter().zip(&self.settings.input_load).enumerate() {
+            state.actuator_fault |= u64::from(load.abs() > *size && j < 64) << (j & 63);
+        }
+    }
+
+    /// Load and gain error of the leading hypothesis as an input.
+    fn find_load(&self, state: &mut BankState, model: &ModeModel) {
+        let Layout { n, m, .. } = self.layout;
+        let (load, gain) = (self.layout.load(), self.layout.gain());
+        let z = &state.slots[state.best].z;
+        for j in 0..m {
+            state.load[j] = dot(&model.b_inverse[j * n..(j + 1) * n], &z[load..load + n])
+                + state.u[j] * z[gain + j];
+        }
+    }
+
+    /// Right after [`observe`](Self::observe): `expected` becomes its change for a small change `dy`
+    /// (p) of the readings. Spoils the state.
+    pub fn differentiate(&self, state: &mut BankState, dy: &[f64]) {
+        let Layout { n, p, d, .. } = self.layout;
+        let size = self.layout.size();
+        let Some(model) = self.modes.get(state.mode.unwrap_or(0)) else {
+            return;
+        };
+        let best = state.best;
+        let (seen, h) = (&mut state.seen[best], &mut state.slots[best]);
+        h.z.fill(0.0);
+        if seen.sound {
+            for q in 0..p {
+                // What is no measurement has a row of zeros.
+                seen.white[q] = dy.get(q).copied().unwrap_or(0.0);
+            }
+            linear::solve(&seen.s, p, &mut seen.white);
+            for (row, &white) in seen.rows.chunks_exact(size).zip(&seen.white) {
+                linear::axpy(&mut h.z, white, row);
+            }
+        }
+        for q in 0..p {
+            state.expected[q] = dot(&model.c[q * n..(q + 1) * n], &h.z[..n])
+                + dot(&model.f[q * d..(q + 1) * d], &h.z[n..n + d]);
+        }
+        self.find_load(state, model);
+    }
+
+    /// One sample on, under the input that acts (m).
+    pub fn advance(&self, state: &mut BankState, u: &[f64]) {
+        let model = &self.modes[state.mode.unwrap_or(0)];
+        for ((d, &new), old) in state.moved.iter_mut().zip(u).zip(&mut state.u) {
+            *d = new - *old;
+            *old = new;
+        }
+        let Layout { n, m, d, .. } = self.layout;
+        let z = &state.slots[state.best].z;
+        for i in 0..n {
+            let mut sum = model.state_offset[i]
+                + dot(&model.a[i * n..(i + 1) * n], &state.own)
+                + dot(&model.e[i * d..(i + 1) * d], &z[n..n + d]);
+            for j in 0..m {
+                sum += model.b[i * m + j] * u[j] * (1.0 + z[self.layout.gain() + j]);
+            }
+            state.scratch[i] = crate::kernel::bounded(sum);
+        }
+        state.own.copy_from_slice(&state.scratch[..n]);
+        for slot in state.live.slots() {
+            state.slots[slot].advance(
+                self.layout,
+                model,
+                &self.settings,
+                &state.noise,
+                &self.rotation,
+                self.output_error(),
+                u,
+                &state.moved,
+                &mut state.scratch,
+            );
+        }
+    }
+}
+
+impl BankState {
+    /// Whether every index in it is one; a state that came as bytes may hold any.
+    pub fn sound(&self) -> bool {
+        self.live.sound() && self.live.contains(self.best)
+    }
+
+    /// The leading hypothesis.
+    pub fn best(&self) -> &Hypothesis {
+        &self.slots[self.best]
+    }
+}

@@ -1,0 +1,224 @@
+//! From the plant and the settings to an estimator ready to run.
+
+use super::competition::Candidates;
+use super::hypothesis::{Hypothesis, Innovation};
+use super::linear::{axpy, factor, solve};
+use super::model::{Layout, ModeModel};
+use super::{Bank, BankState, Live, Prices, SLOTS};
+use crate::matrix::Matrix;
+use crate::parameters::{Channels, Hypotheses, ModeModel as Described};
+use alloc::vec;
+use alloc::vec::Vec;
+
+/// Standard deviation of loads and input gains at the start, relative to that of their jumps.
+const AT_REST: f64 = 0.3;
+
+fn rows(matrix: &Matrix) -> Vec<f64> {
+    let (rows, columns) = matrix.shape();
+    let entry = |row, column| matrix.get(row, column).unwrap_or(0.0);
+    (0..rows)
+        .flat_map(|row| (0..columns).map(move |column| entry(row, column)))
+        .collect()
+}
+
+/// The exosystem's output through `channels` (rows x s): the sine of each harmonic of each channel.
+fn waves(channels: &Matrix, harmonics: usize) -> Vec<f64> {
+    let (count, columns) = channels.shape();
+    rows(&Matrix::from_fn(
+        count,
+        2 * harmonics * columns,
+        |row, wave| {
+            if wave % 2 == 0 {
+                channels
+                    .get(row, wave / 2 / harmonics.max(1))
+                    .unwrap_or(0.0)
+            } else {
+                0.0
+            }
+        },
+    ))
+}
+
+/// `(B'B)^-1 B'` (m x n, row after row) of `b` (n x m, row after row), slightly regularised.
+fn left_inverse(b: &[f64], n: usize, m: usize) -> Vec<f64> {
+    let mut lower = vec![0.0; m * m];
+    for row in b.chunks_exact(m) {
+        for (sums, &left) in lower.chunks_exact_mut(m).zip(row) {
+            axpy(sums, left, row);
+        }
+    }
+    let trace: f64 = (0..m).map(|j| lower[j * m + j]).sum();
+    for j in 0..m {
+        lower[j * m + j] += 1e-12 * trace + f64::MIN_POSITIVE;
+    }
+    let mut out = vec![0.0; m * n];
+    if !factor(&mut lower, m) {
+        return out;
+    }
+    for (i, row) in b.chunks_exact(m).enumerate() {
+        let mut column = row.to_vec();
+        solve(&lower, m, &mut column);
+        for j in (0..m).rev() {
+            for k in j + 1..m {
+                column[j] -= lower[k * m + j] * column[k];
+            }
+            column[j] /= lower[j * m + j];
+        }
+        for (j, &value) in column.iter().enumerate() {
+            out[j * n + i] = value;
+        }
+    }
+    out
+}
+
+/// Covariance of a load's jump (n x n): through the inputs, the disturbance, and on the states.
+fn load(layout: Layout, mode: &Described, channels: &Channels, settings: &Hypotheses) -> Vec<f64> {
+    let n = layout.n;
+    let mut load = vec![0.0; n * n];
+    let sources = [
+        (&mode.b, &settings.input_load),
+        (&channels.e, &settings.disturbance_load),
+    ];
+    for (matrix, sizes) in sources {
+        for (column, size) in matrix.as_slice().chunks_exact(n).zip(sizes) {
+            for (row, &left) in load.chunks_exact_mut(n).zip(column) {
+                axpy(row, left * size * size, column);
+            }
+        }
+    }
+    for i in 0..n {
+        for j in 0..n {
+            let still = f64::from(i == j) - mode.a.get(i, j).unwrap_or(0.0);
+            let moved = still * settings.state_load[j];
+            load[i * n + i] += moved * moved;
+        }
+    }
+    load
+}
+
+fn model(
+    layout: Layout,
+    mode: &Described,
+    channels: &Channels,
+    settings: &Hypotheses,
+) -> ModeModel {
+    let Layout { n, m, .. } = layout;
+    let (b, c) = (rows(&mode.b), rows(&mode.c));
+    let spread = |row: &[f64]| {
+        let parts = row.iter().zip(&settings.state_size);
+        0.25 * parts.map(|(c, size)| (c * size) * (c * size)).sum::<f64>()
+    };
+    let bias = c.chunks_exact(n).map(spread).collect();
+    let inverse = left_inverse(&b, n, m);
+    let harmonics = settings.angles.len();
+    ModeModel::new(
+        layout,
+        rows(&mode.a),
+        b,
+        c,
+        waves(&channels.e, harmonics),
+        waves(&channels.f, harmonics),
+        (&mode.x0, &mode.u0, &mode.y0),
+        load(layout, mode, channels, settings),
+        bias,
+        inverse,
+    )
+}
+
+impl Bank {
+    /// The estimator of a plant with these `modes`; the sizes in `settings` must agree with it.
+    pub fn new(modes: &[Described], settings: &Hypotheses) -> Self {
+        let (n, m, p) = modes.first().map_or((0, 0, 0), |mode| {
+            (mode.a.nrows(), mode.b.ncols(), mode.c.nrows())
+        });
+        let disturbances = settings.disturbance_load.len();
+        let d = 2 * settings.angles.len() * disturbances;
+        let layout = Layout { n, m, p, d };
+        let described = modes.iter().zip(&settings.channels);
+        let ln = libm::log;
+        let turn = |_| {
+            settings
+                .angles
+                .iter()
+                .map(|&angle| (libm::cos(angle), libm::sin(angle)))
+        };
+        Self {
+            layout,
+            modes: described
+                .map(|(mode, channels)| model(layout, mode, channels, settings))
+                .collect(),
+            rotation: (0..disturbances).flat_map(turn).collect(),
+            prices: Prices {
+                fault: ln(settings.fault_rate),
+                stuck: ln(settings.stuck_rate),
+                release: ln(settings.release_rate),
+                change: ln(settings.change_rate),
+                load: ln(settings.load_rate),
+                moving: ln(settings.load_moving),
+                settle: ln(1.0 - settings.load_moving),
+            },
+            settings: settings.clone(),
+        }
+    }
+
+    /// Whether there are more sensors than states, so that they contradict each other where the
+    /// model's output matrix is wrong.
+    pub(super) const fn output_error(&self) -> bool {
+        self.layout.p > self.layout.n
+    }
+
+    /// At rest at the operating point of `mode`.
+    pub fn start(&self, mode: usize) -> BankState {
+        let layout = self.layout;
+        let Layout { n, m, p, d } = layout;
+        let size = layout.size();
+        let settings = &self.settings;
+        let model = &self.modes[mode];
+        let mut first = Hypothesis::new(layout);
+        first.z[..n].copy_from_slice(&model.x0);
+        first.before.copy_from_slice(&model.x0);
+        let mut set = |k: usize, deviation: f64| first.cov[k * size + k] = deviation * deviation;
+        for i in 0..n {
+            set(i, settings.start[i]);
+            set(
+                layout.load() + i,
+                AT_REST * libm::sqrt(model.load[i * n + i]),
+            );
+        }
+        for i in 0..d {
+            set(n + i, settings.disturbance_size[i]);
+        }
+        for j in 0..m {
+            set(layout.gain() + j, AT_REST * settings.gain_error);
+        }
+        let mut slots = vec![Hypothesis::new(layout); SLOTS];
+        slots[0] = first;
+        BankState {
+            slots,
+            seen: vec![Innovation::new(layout); SLOTS],
+            live: Live::ONE,
+            candidates: Candidates::new(p),
+            scratch: vec![0.0; n.max(1) * size],
+            trial: Innovation::new(layout),
+            mode: None,
+            u: model.u0.clone(),
+            moved: vec![0.0; m],
+            first: true,
+            noise: vec![0.0; p],
+            evidence: vec![0.0; p],
+            mean: vec![0.0; p],
+            count: vec![0.0; p],
+            best: 0,
+            misfit: p as f64,
+            own: model.x0.clone(),
+            own_output: vec![0.0; p],
+            expected: vec![0.0; p],
+            residual: vec![0.0; p],
+            accused: 0,
+            suspect: 0,
+            model_valid: true,
+            load: vec![0.0; m],
+            actuator_fault: 0,
+        }
+    }
+}

@@ -1,0 +1,185 @@
+//! Sizes and rates for the state-based estimator, from the plant and its signals.
+
+use crate::assembly::{self, KnownDisturbance};
+use crate::matrices::plain;
+use crate::{Signal, Signals};
+use ftc_control::parameters::{Ambiguous, Channels, Hypotheses};
+use ftc_plant::{Mode, SwitchedPlant};
+
+/// What may be asked of the state-based estimator; the rest follows from the design.
+#[derive(Clone, Debug, PartialEq)]
+pub struct HypothesesSpec {
+    /// Relative error of the entries of the plant's matrices.
+    pub model_error: f64,
+    /// Faults per sample and sensor.
+    pub fault_rate: f64,
+    /// Mean length of a fault in samples.
+    pub fault_length: f64,
+    /// What is done about a slow divergence.
+    pub ambiguous: Ambiguous,
+    /// Largest correction of each sensor (p), output units; the sensor's range when absent.
+    pub authority: Option<Vec<f64>>,
+    /// Size of a load on each input (m), input units; a fifth of the nominal value when absent.
+    pub input_load: Option<Vec<f64>>,
+}
+
+impl Default for HypothesesSpec {
+    fn default() -> Self {
+        Self {
+            model_error: 0.05,
+            fault_rate: 1e-5,
+            fault_length: 1000.0,
+            ambiguous: Ambiguous::TrustSensors,
+            authority: None,
+            input_load: None,
+        }
+    }
+}
+
+/// Freezes per sample and sensor. Rarer than other faults: readings that agree with a constant for a
+/// while are common at rest.
+const STUCK_RATE: f64 = 1e-7;
+/// Jumps of a present fault per sample.
+const CHANGE_RATE: f64 = 1e-3;
+/// Jumps of loads or input gains per sample: as rare as faults.
+const LOAD_RATE: f64 = 1e-5;
+/// Probability that a load that moves goes on moving in the next sample.
+const LOAD_MOVING: f64 = 0.05;
+/// What a sample costs at most while loads move, in log likelihood.
+const SURPRISE: f64 = 2.0;
+/// Log odds of an accusation against the best explanation without one: 400 to 1.
+const ODDS: f64 = 6.0;
+/// Wander of an abrupt fault per sample, in noise deviations.
+const FAULT_WALK: f64 = 0.05;
+/// Wander of a fault that grew slowly per sample, in noise deviations.
+const DRIFT_WALK: f64 = 0.5;
+/// Size of a fault without a known range, relative to the nominal value and to the operating point.
+const FAULT_SIZE: [f64; 2] = [0.6, 0.5];
+/// Size of a fault relative to a known range.
+const FAULT_OF_RANGE: f64 = 0.5;
+/// Authority without a known range, relative to the nominal value and to the operating point.
+const AUTHORITY: [f64; 2] = [2.5, 2.0];
+/// Size of a load on an input relative to its nominal value.
+const INPUT_LOAD: f64 = 0.2;
+/// Displacement at rest by a load on a state, relative to the state's nominal value.
+const STATE_LOAD: f64 = 0.03;
+/// Wander of a load per sample relative to the size of its jumps.
+const LOAD_WALK: f64 = 5e-3;
+/// Relative error of an input's gain, and its wander per sample.
+const GAIN_ERROR: f64 = 0.3;
+const GAIN_WALK: f64 = 1e-4;
+/// Relative error of the disturbance's period.
+const PERIOD_ERROR: f64 = 0.05;
+/// How far the disturbance may move an output where its size is not known, relative to nominal.
+const DISTURBANCE: f64 = 0.3;
+/// Error of the state at the start relative to its nominal value.
+const START: f64 = 3e-3;
+
+impl HypothesesSpec {
+    /// The estimator's sizes and rates for `plant` with these signals, under the disturbance that is
+    /// `known`.
+    pub fn settings(
+        &self,
+        plant: &SwitchedPlant,
+        signals: &Signals,
+        known: Option<&KnownDisturbance>,
+    ) -> Hypotheses {
+        let scaling = assembly::scaling(signals);
+        let outputs = &signals.outputs;
+        let disturbance = known
+            .and_then(|known| known.amplitude.clone())
+            .filter(|sizes| sizes.iter().all(|&size| size > 0.0))
+            .unwrap_or_else(|| unknown_disturbance(plant, &scaling.outputs));
+        let angles = known.map_or_else(Vec::new, |known| known.angles(plant.sample_time));
+        let waves = disturbance
+            .iter()
+            .flat_map(|&size| vec![size; 2 * angles.len()]);
+        let channels = plant.modes.iter().map(|mode| Channels {
+            e: plain(&mode.e),
+            f: plain(&mode.f),
+        });
+        Hypotheses {
+            channels: channels.collect(),
+            fault_rate: self.fault_rate,
+            stuck_rate: STUCK_RATE,
+            release_rate: 1.0 / self.fault_length,
+            change_rate: CHANGE_RATE,
+            load_rate: LOAD_RATE,
+            load_moving: LOAD_MOVING,
+            surprise: SURPRISE,
+            odds: ODDS,
+            fault_size: per_sensor(plant, outputs, FAULT_OF_RANGE, FAULT_SIZE),
+            fault_walk: FAULT_WALK,
+            drift_walk: DRIFT_WALK,
+            input_load: self
+                .input_load
+                .clone()
+                .unwrap_or_else(|| scaled(&scaling.inputs, INPUT_LOAD)),
+            disturbance_size: waves.collect(),
+            disturbance_load: disturbance,
+            state_load: scaled(&scaling.states, STATE_LOAD),
+            load_walk: LOAD_WALK,
+            model_error: self.model_error,
+            gain_error: GAIN_ERROR,
+            gain_walk: GAIN_WALK,
+            period_error: PERIOD_ERROR,
+            angles,
+            start: scaled(&scaling.states, START),
+            start_elsewhere: scaling.states.clone(),
+            state_size: scaling.states,
+            authority: self
+                .authority
+                .clone()
+                .unwrap_or_else(|| per_sensor(plant, outputs, 1.0, AUTHORITY)),
+            ambiguous: self.ambiguous,
+        }
+    }
+}
+
+fn scaled(values: &[f64], factor: f64) -> Vec<f64> {
+    values.iter().map(|value| factor * value).collect()
+}
+
+/// A size for each sensor: a share of its range, or shares of nominal value and operating point.
+fn per_sensor(
+    plant: &SwitchedPlant,
+    outputs: &[Signal],
+    share: f64,
+    [nominal, point]: [f64; 2],
+) -> Vec<f64> {
+    let size = |(q, output): (usize, &Signal)| {
+        let away = plant
+            .modes
+            .iter()
+            .map(|mode| mode.operating_point.y[q].abs())
+            .fold(0.0, f64::max);
+        let range = output
+            .max
+            .zip(output.min)
+            .map(|(max, min)| share * (max - min));
+        range.unwrap_or(nominal * output.nominal + point * away)
+    };
+    outputs.iter().enumerate().map(size).collect()
+}
+
+/// The size of each disturbance channel that moves an output by [`DISTURBANCE`] of its nominal value.
+fn unknown_disturbance(plant: &SwitchedPlant, nominal: &[f64]) -> Vec<f64> {
+    let channels = plant.dimensions().disturbances;
+    let effect = |mode: &Mode, channel: usize| {
+        let outputs = nominal.iter().enumerate().map(|(q, nominal)| {
+            let direct = mode.f[(q, channel)].abs();
+            (mode.c.row(q).norm() * mode.e.column(channel).norm() + direct) / nominal
+        });
+        outputs.fold(0.0, f64::max)
+    };
+    (0..channels)
+        .map(|channel| {
+            let most = plant
+                .modes
+                .iter()
+                .map(|mode| effect(mode, channel))
+                .fold(0.0, f64::max);
+            if most > 0.0 { DISTURBANCE / most } else { 0.0 }
+        })
+        .collect()
+}

@@ -1,0 +1,181 @@
+//! The state-based estimator in the loop: no good sensor is sacrificed when the plant changes, abrupt
+//! faults are taken out at once, and whatever the sensors say the numbers stay finite.
+
+mod common;
+mod random_plants;
+
+use common::{Channel, REFERENCES, plant, reference, scenario, state_based};
+use ftc_control::parameters::EstimatorMethod;
+use ftc_control::{Controller, ControllerState};
+use ftc_design::Design;
+use ftc_plant::scenario::{FaultEvent, FaultKind, ModeInterval};
+use ftc_plant::{SwitchedPlant, TruePlant};
+use ftc_simulate::{PlantSimulator, Trajectory, Variant, run};
+use proptest::prelude::*;
+use random_plants::Dice;
+
+const STEPS: u64 = 1200;
+
+/// Random designs with at least two sensors, on a schedule with switches.
+fn designs(seed: u64, count: usize) -> Vec<Design> {
+    let mut dice = Dice::seeded(seed);
+    let mut found = Vec::new();
+    while found.len() < count {
+        let mut design = random_plants::design_with(&mut dice, EstimatorMethod::Observer);
+        let plant = &design.plant;
+        if plant.dimensions().outputs < 2 {
+            continue;
+        }
+        design.scenario.steps = STEPS;
+        design.scenario.schedule = (0..6)
+            .map(|at| ModeInterval {
+                from: 200.0 * at as f64 * plant.sample_time,
+                mode: at % 2,
+            })
+            .collect();
+        found.push(design);
+    }
+    found
+}
+
+fn simulate(design: &Design, truth: &SwitchedPlant, variant: Variant) -> Trajectory {
+    let truth = TruePlant::Linear {
+        plant: truth.clone(),
+    };
+    let plant =
+        PlantSimulator::with_true_plant(design.plant.clone(), truth, design.scenario.clone());
+    let controller = Controller::new(design.parameters()).unwrap();
+    run(&plant, &controller, variant)
+}
+
+fn true_error(design: &Design, run: &Trajectory) -> f64 {
+    let merits = run.merits(&design.controller.feedback.tracked);
+    merits.iter().map(|merit| merit.truth.mse).sum()
+}
+
+fn ratio(design: &Design, truth: &SwitchedPlant, against: Variant) -> f64 {
+    let error = |variant| true_error(design, &simulate(design, truth, variant));
+    error(Variant::Ftc) / error(against)
+}
+
+fn median(mut values: Vec<f64>) -> f64 {
+    values.sort_by(f64::total_cmp);
+    values[values.len() / 2]
+}
+
+#[test]
+fn healthy_sensors_are_believed_when_an_input_loses_gain() {
+    let mut ratios = Vec::new();
+    for design in designs(11, 5) {
+        for factor in [0.9, 0.8, 0.7, 1.15] {
+            let mut truth = design.plant.clone();
+            for mode in &mut truth.modes {
+                mode.b.column_mut(0).scale_mut(factor);
+            }
+            ratios.push(ratio(&design, &truth, Variant::NoFtc));
+        }
+    }
+    println!("over no FTC: {ratios:.4?}");
+    let worst = ratios.iter().copied().fold(0.0, f64::max);
+    assert!(worst <= 2.0 && median(ratios) <= 1.01, "{worst}");
+}
+
+#[test]
+fn abrupt_faults_are_taken_out() {
+    let mut ratios = Vec::new();
+    for (at, mut design) in designs(12, 5).into_iter().enumerate() {
+        let te = design.plant.sample_time;
+        for (from, sigmas) in [(300.0, 20.0), (400.0, 50.0), (520.0, 100.0)] {
+            design.scenario.events = vec![FaultEvent {
+                sensor: at % 2,
+                from: from * te,
+                until: (from + 250.0) * te,
+                kind: FaultKind::Bias {
+                    size: sigmas * random_plants::NOISE,
+                },
+            }];
+            let truth = design.plant.clone();
+            ratios.push(ratio(&design, &truth, Variant::ToldTheFault));
+        }
+    }
+    println!("over told: {ratios:.4?}");
+    let worst = ratios.iter().copied().fold(0.0, f64::max);
+    assert!(worst <= 1.5 && median(ratios) <= 1.01, "{worst}");
+}
+
+#[test]
+fn both_sensors_of_the_papers_example_at_once() {
+    for channel in [Channel::State, Channel::Output] {
+        for name in REFERENCES {
+            let parameters = state_based(channel, 0.005);
+            let plant = PlantSimulator::new(plant(channel), scenario(reference(name), 0.005, 1));
+            let controller = Controller::new(parameters).unwrap();
+            let error = |variant| -> f64 {
+                let merits = run(&plant, &controller, variant).merits(&[0, 1]);
+                merits.iter().map(|merit| merit.truth.mse).sum()
+            };
+            let (ours, told) = (error(Variant::Ftc), error(Variant::ToldTheFault));
+            println!("{channel:?} {name}: {:.4}", ours / told);
+            assert!(ours <= 1.05 * told, "{channel:?} {name}: {}", ours / told);
+        }
+    }
+}
+
+#[test]
+fn healthy_sensors_are_not_accused() {
+    for mut design in designs(13, 3) {
+        design.scenario.steps = 20_000;
+        let truth = design.plant.clone();
+        let run = simulate(&design, &truth, Variant::Ftc);
+        let accused = run.records.iter().filter(|r| r.flagged.contains(&true));
+        assert_eq!(accused.count(), 0);
+    }
+}
+
+fn tick(controller: &Controller, state: &mut ControllerState, k: u64, mode: usize, y: &[f64]) {
+    let sample = controller.sample(k, mode, y, &[0.3, -0.2]).unwrap();
+    controller.tick(state, &sample);
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(150))]
+    /// Any bit pattern as measurement, any mode: every output stays finite.
+    #[test]
+    fn finite_whatever_the_sensors_say(
+        samples in prop::collection::vec((any::<u64>(), any::<u64>(), 0usize..2), 1..120),
+    ) {
+        let controller = Controller::new(state_based(Channel::State, 0.005)).unwrap();
+        let mut state = controller.initial_state(0);
+        for (k, (first, second, mode)) in samples.into_iter().enumerate() {
+            let y = [f64::from_bits(first), f64::from_bits(second)];
+            tick(&controller, &mut state, k as u64, mode, &y);
+            let bank = state.bank.as_ref().unwrap();
+            let outputs = [&state.command, &state.observer.estimate, &state.estimator.fault,
+                &state.estimator.residual, &state.corrected, &bank.load];
+            prop_assert!(outputs.into_iter().flatten().all(|v| v.is_finite()), "tick {k}");
+            prop_assert!(bank.sound());
+        }
+    }
+}
+
+/// A copy continues as the original does, and nothing of its size changes on the way.
+#[test]
+fn a_copy_is_a_snapshot() {
+    let controller = Controller::new(state_based(Channel::State, 0.005)).unwrap();
+    let mut state = controller.initial_state(0);
+    for k in 0..200 {
+        let y = [
+            0.3 + 0.01 * (k % 7) as f64,
+            if k > 100 { 0.4 } else { -0.2 },
+        ];
+        tick(&controller, &mut state, k, (k / 60) as usize % 2, &y);
+    }
+    let mut copy = controller.initial_state(0);
+    copy.clone_from(&state);
+    assert!(controller.fits(&copy));
+    for k in 200..260 {
+        tick(&controller, &mut state, k, 0, &[0.3, f64::NAN]);
+        tick(&controller, &mut copy, k, 0, &[0.3, f64::NAN]);
+    }
+    assert_eq!(state.command, copy.command);
+}
