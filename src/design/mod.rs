@@ -14,6 +14,8 @@ mod controllability;
 mod feedforward;
 pub mod harmonics;
 #[cfg(feature = "design")]
+mod interior_point;
+#[cfg(feature = "design")]
 pub mod lmi;
 mod lyapunov;
 pub mod observer;

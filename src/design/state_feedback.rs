@@ -7,6 +7,8 @@ mod advice;
 #[cfg(feature = "design")]
 mod frame;
 #[cfg(feature = "design")]
+mod structured;
+#[cfg(feature = "design")]
 mod synthesis;
 #[cfg(feature = "design")]
 mod theorem;

@@ -6,6 +6,7 @@
 
 use super::advice;
 use super::frame::{Frame, Part};
+use super::structured;
 use super::theorem;
 use super::{ModeGains, REJECTION, StateFeedback};
 use crate::design::augmented::{AugmentedMode, augment, scaled};
@@ -70,6 +71,11 @@ fn attempt(
         models: augment(plant, spec, &units),
         units,
     };
+    let disturbed = road.models.iter().any(|model| model.e.amax() > 0.0);
+    let optimised = spec.objective == Objective::Attenuation && disturbed;
+    if optimised && let Some(design) = road.direct() {
+        return Ok(design);
+    }
     let mut stable = Vec::new();
     for group in road.groups() {
         match road.stabilised(&group)? {
@@ -79,10 +85,9 @@ fn attempt(
             }
         }
     }
-    let disturbed = road.models.iter().any(|model| model.e.amax() > 0.0);
-    match spec.objective {
-        Objective::Attenuation if disturbed => road.attenuate(&stable),
-        Objective::Attenuation | Objective::Decay => road.certified(stable.concat(), None),
+    match optimised {
+        true => road.attenuate(&stable),
+        false => road.certified(stable.concat(), None),
     }
 }
 
@@ -173,6 +178,43 @@ impl Road<'_> {
     /// Modes that share a problem.
     fn groups(&self) -> Vec<Vec<usize>> {
         self.spec.lyapunov.groups(self.models.len())
+    }
+
+    /// The design by the interior-point method that uses the structure, from the coordinates of
+    /// regulators; `None` where any part of it falls short.
+    fn direct(&self) -> Option<StateFeedback> {
+        let groups = self.groups();
+        let least = groups.iter().map(|group| self.direct_level(group));
+        let least = least.collect::<Option<Vec<_>>>()?;
+        SACRIFICES.iter().find_map(|&sacrifice| {
+            let mut levels = Levels::new(self);
+            let mut parts = Vec::new();
+            for (group, least) in groups.iter().zip(&least) {
+                let (frame, level) = (&least.frame, levels.set(group, least, sacrifice));
+                let view = frame.view(&self.models);
+                let level = frame.view_level(level);
+                let found = structured::centred(&view, self.spec, group, level).ok()?;
+                parts.extend(frame.restore(found));
+            }
+            self.certified(parts, Some(levels)).ok()
+        })
+    }
+
+    /// The least level of a group by the interior-point method that uses the structure.
+    fn direct_level(&self, group: &[usize]) -> Option<Optimum> {
+        let models = &self.models;
+        let regulated = Frame::of_regulated(models, group, self.spec.decay)?;
+        let regulated = regulated.with_signals(models, group);
+        let floor = regulated.view_level(REJECTION.powi(2));
+        let view = regulated.view(models);
+        let found = structured::least_level(&view, self.spec, group, floor).ok()?;
+        let level = regulated.restore_level(found.level);
+        let frame = Frame::of_attenuated(models, &regulated.restore(found.parts), level)?;
+        Some(Optimum {
+            level,
+            bound: regulated.restore_level(found.bound),
+            frame,
+        })
     }
 
     /// Stabilising gains of a group (T1).
