@@ -8,7 +8,7 @@ mod random_plants;
 use adapting::{
     STEPS, bears, change_gains, changed_plant, errors, play, ratio, scale_thresholds, with_faults,
 };
-use ftc::simulate::Variant;
+use ftc_simulate::Variant;
 use random_plants::{Dice, design};
 
 const PLANTS: usize = 25;

@@ -2,9 +2,9 @@
 
 mod plants;
 
-use ftc::design::as_printed::{theorem_1, theorem_2};
-use ftc::design::{ControlSpec, Lyapunov};
-use ftc::plant::SwitchedPlant;
+use ftc_design::as_printed::{theorem_1, theorem_2};
+use ftc_design::{ControlSpec, Lyapunov};
+use ftc_plant::SwitchedPlant;
 use nalgebra::DMatrix;
 use plants::{Channel, Lottery, mode, paper, paper_spec};
 

@@ -2,12 +2,12 @@
 
 mod plants;
 
-use ftc::design::certificate::{CertificateError, Enclosure};
-use ftc::design::{
+use ftc_design::certificate::{CertificateError, Enclosure};
+use ftc_design::{
     ControlSpec, Lyapunov, ObserverChoice, ObserverSpec, StateFeedback, Synthesis, synthesise,
 };
-use ftc::plant::SwitchedPlant;
-use ftc::plant::scaling::Scaling;
+use ftc_plant::SwitchedPlant;
+use ftc_plant::scaling::Scaling;
 use nalgebra::DMatrix;
 use plants::{Channel, Lottery, paper, paper_spec};
 

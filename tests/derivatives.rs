@@ -6,12 +6,13 @@
 mod common;
 
 use common::{Channel, controller, plant, reference, scenario};
-use ftc::control::parameters::{Compensation, EstimatorMethod, Limits};
-use ftc::control::{Compensate, Controller, ControllerParameters, ControllerState, Sample};
-use ftc::plant::rectifier::Rectifier;
-use ftc::simulate::plant::{Change, External};
-use ftc::simulate::scenario::{FaultEvent, FaultKind, ModeInterval, Waveform};
-use ftc::simulate::{PlantSimulator, PlantState, Scenario, Truth};
+use ftc_control::parameters::{Compensation, EstimatorMethod, Limits};
+use ftc_control::{Compensate, Controller, ControllerParameters, ControllerState, Sample};
+use ftc_plant::rectifier::Rectifier;
+use ftc_plant::scenario::{FaultEvent, FaultKind, ModeInterval, Waveform};
+use ftc_plant::{Scenario, Truth};
+use ftc_simulate::plant::{Change, External};
+use ftc_simulate::{PlantSimulator, PlantState};
 use nalgebra::DMatrix;
 use proptest::prelude::*;
 
@@ -131,7 +132,7 @@ proptest! {
             // Compensation may be switched off or on just before the last tick.
             let believes = believe[usize::from(tick == ticks)];
             let compensate = if believes { Compensate::Nothing } else { Compensate::Estimate };
-            let sample = |y: &[f64; 2], reference: &[f64; 2], state: &mut ControllerState, derive: Option<ftc::control::Change<'_>>| {
+            let sample = |y: &[f64; 2], reference: &[f64; 2], state: &mut ControllerState, derive: Option<ftc_control::Change<'_>>| {
                 let sample = Sample {
                     tick, mode, measurement: y, reference, thresholds: &thresholds, compensate,
                 };
@@ -153,7 +154,7 @@ proptest! {
                     .map(|(below, above)| (above - below) / (2.0 * STEP)).collect();
                 let largest = outputs(below).iter().fold(1.0, |most: f64, v| most.max(v.abs()));
                 let mut trial = state.clone();
-                let change = ftc::control::Change { measurement: &direction, reference: &steering };
+                let change = ftc_control::Change { measurement: &direction, reference: &steering };
                 sample(&y, &reference, &mut trial, Some(change));
                 last = Some((unmoved, expected, outputs(&trial), largest));
             }

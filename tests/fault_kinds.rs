@@ -4,9 +4,9 @@
 mod common;
 
 use common::{Channel, controller, plant, reference, scenario};
-use ftc::control::Controller;
-use ftc::simulate::scenario::{FaultEvent, FaultKind, Waveform};
-use ftc::simulate::{PlantSimulator, Trajectory, Variant, run};
+use ftc_control::Controller;
+use ftc_plant::scenario::{FaultEvent, FaultKind, Waveform};
+use ftc_simulate::{PlantSimulator, Trajectory, Variant, run};
 use nalgebra::DVector;
 
 const KINDS: [(&str, FaultKind); 6] = [

@@ -4,8 +4,8 @@
 mod common;
 
 use common::{Channel, REFERENCES, controller, reference, scenario};
-use ftc::control::Controller;
-use ftc::simulate::{PlantSimulator, Trajectory, Variant, run};
+use ftc_control::Controller;
+use ftc_simulate::{PlantSimulator, Trajectory, Variant, run};
 
 fn simulate(channel: Channel, name: &str, noise: f64, variant: Variant) -> Trajectory {
     let parameters = controller(channel, noise);

@@ -4,19 +4,19 @@ mod common;
 
 use common::{Channel, plant, reference, scenario};
 use core::f64::consts::TAU;
-use ftc::control::Controller;
-use ftc::control::parameters::{Compensation, EstimatorMethod};
-use ftc::design::assembly::{
+use ftc_control::Controller;
+use ftc_control::parameters::{Compensation, EstimatorMethod};
+use ftc_design::assembly::{
     DatabaseSource, EstimatorSpec, KnownDisturbance, Request, Threshold, assemble,
 };
-use ftc::design::{
+use ftc_design::{
     ControlSpec, Design, DesignError, Lyapunov, ObserverChoice, ObserverSpec, Signal, Signals,
     check_controllable, state_feedback,
 };
-use ftc::plant::scaling::Scaling;
-use ftc::plant::{Mode, OperatingPoint, SwitchedPlant};
-use ftc::simulate::scenario::{ModeInterval, Waveform};
-use ftc::simulate::{PlantSimulator, Variant, run};
+use ftc_plant::scaling::Scaling;
+use ftc_plant::scenario::{ModeInterval, Waveform};
+use ftc_plant::{Mode, OperatingPoint, SwitchedPlant};
+use ftc_simulate::{PlantSimulator, Variant, run};
 use nalgebra::{DMatrix, dmatrix};
 
 /// The paper's disturbance turns by this angle each sample.
@@ -81,7 +81,7 @@ fn design(channel: Channel, control: ControlSpec) -> Design {
             disturbance: Some(disturbance(1)),
         },
         compensation: Compensation::VirtualSensor,
-        truth: ftc::simulate::Truth::AsDesigned,
+        truth: ftc_plant::Truth::AsDesigned,
         scenario: scenario(reference("sine"), 0.0, 1),
         control,
     })
@@ -220,7 +220,7 @@ fn advice_about_a_decay_too_fast_for_two_harmonics_is_good_advice() {
     let Err(DesignError::Infeasible(infeasibility)) = verdict(&control) else {
         panic!("gains beyond double precision were found");
     };
-    let harmonics = ftc::design::Advice::Harmonics(1);
+    let harmonics = ftc_design::Advice::Harmonics(1);
     assert!(infeasibility.advice.contains(&harmonics));
     for advice in &infeasibility.advice {
         verdict(&advice.apply(&control)).unwrap();

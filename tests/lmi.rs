@@ -2,8 +2,8 @@
 
 mod plants;
 
-use ftc::design::lmi::{Affine, Inequality, Problem};
-use ftc::design::{BlockKind, BlockName};
+use ftc_design::lmi::{Affine, Inequality, Problem};
+use ftc_design::{BlockKind, BlockName};
 use nalgebra::DMatrix;
 use plants::Lottery;
 
@@ -69,7 +69,7 @@ fn the_margin_decides_stability() {
     for case in 0..40 {
         let n = lottery.between(1, 5);
         let shape = lottery.matrix(n, n);
-        let radius = ftc::plant::spectral_radius(&shape);
+        let radius = ftc_plant::spectral_radius(&shape);
         let wanted = if case % 2 == 0 { 0.97 } else { 1.03 };
         let a = shape * (wanted / radius);
         let mut problem = Problem::new();

@@ -4,17 +4,18 @@
 mod common;
 
 use common::{Channel, REFERENCES, plant, reference, scenario};
-use ftc::control::Controller;
-use ftc::control::parameters::{Compensation, EstimatorMethod};
-use ftc::design::assembly::{
+use ftc_control::Controller;
+use ftc_control::parameters::{Compensation, EstimatorMethod};
+use ftc_design::assembly::{
     DatabaseSource, EstimatorSpec, KnownDisturbance, Request, Threshold, assemble,
 };
-use ftc::design::{
+use ftc_design::{
     ControlSpec, Design, ObserverChoice, ObserverSpec, Signal, Signals, commissioning,
 };
-use ftc::plant::SwitchedPlant;
-use ftc::simulate::noise::standard_normal;
-use ftc::simulate::{PlantSimulator, Truth, Variant, run};
+use ftc_plant::SwitchedPlant;
+use ftc_plant::Truth;
+use ftc_plant::noise::standard_normal;
+use ftc_simulate::{PlantSimulator, Variant, run};
 
 const DRAWS: u64 = 20;
 const RESPONSE: usize = 25;
@@ -51,7 +52,7 @@ fn signals(name: &str) -> Vec<Signal> {
 fn design(model: &SwitchedPlant, truth: &SwitchedPlant, noise: f64) -> Design {
     let dims = model.dimensions();
     let samples = RESPONSE + commissioning::commissioning_samples(dims.inputs, RESPONSE);
-    let log = |(mode, seed): (&ftc::plant::Mode, u64)| {
+    let log = |(mode, seed): (&ftc_plant::Mode, u64)| {
         commissioning::commission(mode, &[1.0, 1.0], &[noise; 2], samples, seed)
     };
     let control = ControlSpec {
@@ -63,7 +64,7 @@ fn design(model: &SwitchedPlant, truth: &SwitchedPlant, noise: f64) -> Design {
     let observer = ObserverSpec {
         kind: ObserverChoice::Auto,
         decay: 0.7,
-        lyapunov: ftc::design::Lyapunov::Common,
+        lyapunov: ftc_design::Lyapunov::Common,
     };
     assemble(Request {
         name: "wrong".into(),
@@ -73,7 +74,7 @@ fn design(model: &SwitchedPlant, truth: &SwitchedPlant, noise: f64) -> Design {
             states: signals("x"),
         },
         plant: model.clone(),
-        truth: ftc::simulate::Truth::AsDesigned,
+        truth: ftc_plant::Truth::AsDesigned,
         control,
         bumpless: false,
         feedforward: true,

@@ -2,11 +2,11 @@
 
 mod plants;
 
-use ftc::control::parameters::ObserverKind;
-use ftc::design::observer::synthesise;
-use ftc::design::{DesignError, Lyapunov, ObserverChoice, ObserverDesign, ObserverSpec};
-use ftc::plant::scaling::Scaling;
-use ftc::plant::{SwitchedPlant, spectral_radius};
+use ftc_control::parameters::ObserverKind;
+use ftc_design::observer::synthesise;
+use ftc_design::{DesignError, Lyapunov, ObserverChoice, ObserverDesign, ObserverSpec};
+use ftc_plant::scaling::Scaling;
+use ftc_plant::{SwitchedPlant, spectral_radius};
 use nalgebra::DMatrix;
 use plants::{Channel, mode, paper, random_plant, rows};
 

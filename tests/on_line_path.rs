@@ -3,8 +3,8 @@
 mod common;
 
 use common::{Channel, controller, reference, scenario};
-use ftc::control::{Compensate, Controller, ControllerState, Sample};
-use ftc::simulate::{PlantSimulator, Variant, run};
+use ftc_control::{Compensate, Controller, ControllerState, Sample};
+use ftc_simulate::{PlantSimulator, Variant, run};
 use proptest::prelude::*;
 use std::alloc::{GlobalAlloc, Layout, System};
 use std::cell::Cell;
@@ -166,11 +166,11 @@ proptest! {
     fn a_lost_sensor_is_bridged(sensor in 0usize..2, from in 60u64..700, length in 1u64..60) {
         let parameters = controller(Channel::State, 0.0);
         let mut scenario = scenario(reference("constant"), 0.0, 1);
-        scenario.fault = vec![ftc::simulate::scenario::Waveform::ZERO; 2];
+        scenario.fault = vec![ftc_plant::scenario::Waveform::ZERO; 2];
         scenario.steps = 780;
-        scenario.events = vec![ftc::simulate::scenario::FaultEvent {
+        scenario.events = vec![ftc_plant::scenario::FaultEvent {
             sensor, from: from as f64, until: (from + length) as f64,
-            kind: ftc::simulate::scenario::FaultKind::Dropout,
+            kind: ftc_plant::scenario::FaultKind::Dropout,
         }];
         let plant = PlantSimulator::new(parameters.plant.clone(), scenario);
         let lost = run(&plant, &Controller::new(parameters), Variant::Ftc);

@@ -4,10 +4,10 @@
 mod common;
 
 use common::{Channel, plant, scenario};
-use ftc::control::parameters::Limits;
-use ftc::simulate::baselines::predictive::{Predictive, PredictiveSpec};
-use ftc::simulate::scenario::Waveform;
-use ftc::simulate::{PlantSimulator, Trajectory, Variant, run_with};
+use ftc_control::parameters::Limits;
+use ftc_plant::scenario::Waveform;
+use ftc_simulate::baselines::predictive::{Predictive, PredictiveSpec};
+use ftc_simulate::{PlantSimulator, Trajectory, Variant, run_with};
 
 fn spec(limit: f64) -> PredictiveSpec {
     PredictiveSpec {

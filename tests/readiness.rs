@@ -5,10 +5,10 @@
 mod common;
 
 use common::{Channel, controller, reference, scenario};
-use ftc::control::Controller;
-use ftc::control::parameters::ControllerParameters;
-use ftc::simulate::scenario::{FaultEvent, FaultKind, Waveform};
-use ftc::simulate::{PlantSimulator, Trajectory, Variant, run};
+use ftc_control::Controller;
+use ftc_control::parameters::ControllerParameters;
+use ftc_plant::scenario::{FaultEvent, FaultKind, Waveform};
+use ftc_simulate::{PlantSimulator, Trajectory, Variant, run};
 
 const STEPS: u64 = 3000;
 

@@ -2,11 +2,11 @@
 
 mod plants;
 
-use ftc::design::augmented::augment;
-use ftc::design::state_feedback::synthesise;
-use ftc::design::{ControlSpec, DesignError, Lyapunov, Objective, StateFeedback, Units};
-use ftc::plant::scaling::Scaling;
-use ftc::plant::{SwitchedPlant, spectral_radius};
+use ftc_design::augmented::augment;
+use ftc_design::state_feedback::synthesise;
+use ftc_design::{ControlSpec, DesignError, Lyapunov, Objective, StateFeedback, Units};
+use ftc_plant::scaling::Scaling;
+use ftc_plant::{SwitchedPlant, spectral_radius};
 use nalgebra::{Complex, DMatrix};
 use plants::{
     Channel, half_unstable, paper, paper_spec, random_plant, rectifier, sparsely_disturbed,

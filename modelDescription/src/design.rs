@@ -1,7 +1,7 @@
 //! The design as an FMU carries it, and what the tables need of it.
 
 use crate::{Interface, SignalInfo};
-use ftc::design::{Design, Signal};
+use ftc_design::{Design, Signal};
 
 /// Name of the design in an FMU's `resources` folder.
 pub const DESIGN_FILE: &str = "design.json";

@@ -2,10 +2,11 @@
 #![allow(dead_code, missing_docs)]
 
 use crate::random_plants::{Dice, design};
-use ftc::control::Controller;
-use ftc::design::Design;
-use ftc::simulate::scenario::{FaultEvent, FaultKind, ModeInterval};
-use ftc::simulate::{PlantSimulator, Trajectory, Truth, Variant, run};
+use ftc_control::Controller;
+use ftc_design::Design;
+use ftc_plant::Truth;
+use ftc_plant::scenario::{FaultEvent, FaultKind, ModeInterval};
+use ftc_simulate::{PlantSimulator, Trajectory, Variant, run};
 
 pub const STEPS: u64 = 6000;
 

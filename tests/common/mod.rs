@@ -1,15 +1,15 @@
 //! The paper's example, built by hand: plant, scenario and a controller with fixed gains.
 #![allow(dead_code, missing_docs)]
 
-use ftc::control::ControllerParameters;
-use ftc::control::parameters::{
+use ftc_control::ControllerParameters;
+use ftc_control::parameters::{
     Compensation, Estimator, EstimatorMethod, FeedbackGains, Gain, Harmonics, Limits, Observer,
     ObserverKind, StateFeedback,
 };
-use ftc::design::commissioning;
-use ftc::plant::{Mode, OperatingPoint, SwitchedPlant};
-use ftc::simulate::Scenario;
-use ftc::simulate::scenario::{ModeInterval, Waveform};
+use ftc_design::commissioning;
+use ftc_plant::Scenario;
+use ftc_plant::scenario::{ModeInterval, Waveform};
+use ftc_plant::{Mode, OperatingPoint, SwitchedPlant};
 use nalgebra::{DMatrix, dmatrix};
 
 /// Where the disturbance enters.
@@ -184,7 +184,7 @@ pub fn controller(channel: Channel, noise: f64) -> ControllerParameters {
                 memory: 3000.0,
                 initial_variance: 1e6,
             }),
-            harmonic_transfers: ftc::design::harmonics::transfers(
+            harmonic_transfers: ftc_design::harmonics::transfers(
                 &plant,
                 core::f64::consts::TAU / 0.02,
                 1,

@@ -1,8 +1,8 @@
 //! Plants the tests share.
 #![allow(dead_code)] // each test file uses its own part
 
-use ftc::design::{ControlSpec, Lyapunov};
-use ftc::plant::{Mode, OperatingPoint, SwitchedPlant};
+use ftc_design::{ControlSpec, Lyapunov};
+use ftc_plant::{Mode, OperatingPoint, SwitchedPlant};
 use nalgebra::DMatrix;
 
 /// Where the paper's disturbance enters.
@@ -325,7 +325,7 @@ pub fn sparsely_disturbed(seed: u64) -> SwitchedPlant {
     let variation = |_| {
         let own = &a + 0.1 * lottery.matrix(n, n);
         let radius = 0.75 + 0.25 * lottery.number();
-        let scale = radius / ftc::plant::spectral_radius(&own);
+        let scale = radius / ftc_plant::spectral_radius(&own);
         let input = &b + 0.1 * lottery.matrix(n, m);
         mode(
             own * scale,

@@ -1,14 +1,14 @@
 //! Random switched plants with certified designs, for benches and property tests.
 #![allow(dead_code, missing_docs)]
 
-use ftc::control::parameters::{Compensation, EstimatorMethod};
-use ftc::design::assembly::{
+use ftc_control::parameters::{Compensation, EstimatorMethod};
+use ftc_design::assembly::{
     DatabaseSource, EstimatorSpec, KnownDisturbance, Request, Threshold, assemble,
 };
-use ftc::design::{ControlSpec, Design, Lyapunov, ObserverChoice, ObserverSpec, Signal, Signals};
-use ftc::plant::{Mode, OperatingPoint, SwitchedPlant, spectral_radius};
-use ftc::simulate::Scenario;
-use ftc::simulate::scenario::{ModeInterval, Waveform};
+use ftc_design::{ControlSpec, Design, Lyapunov, ObserverChoice, ObserverSpec, Signal, Signals};
+use ftc_plant::Scenario;
+use ftc_plant::scenario::{ModeInterval, Waveform};
+use ftc_plant::{Mode, OperatingPoint, SwitchedPlant, spectral_radius};
 use nalgebra::DMatrix;
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::{Rng, SeedableRng};
@@ -137,7 +137,7 @@ pub fn design(dice: &mut Dice) -> Design {
                 }),
             },
             compensation: Compensation::VirtualSensor,
-            truth: ftc::simulate::Truth::AsDesigned,
+            truth: ftc_plant::Truth::AsDesigned,
             scenario,
         };
         if let Ok(design) = assemble(request) {

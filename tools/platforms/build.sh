@@ -42,7 +42,7 @@ pack() {
     local folder=target/release/fmu-binaries/$1
     mkdir -p "$folder"
     for name in ftc_controller ftc_plant; do
-        cp "$built/$2$name.$3" "$folder/$name.$3"
+        cp "$built/$2${name}_fmu.$3" "$folder/$name.$3"
     done
     echo "built $folder"
 }

@@ -13,6 +13,6 @@ esac
 folder=target/release/fmu-binaries/$platform
 mkdir -p "$folder"
 for name in ftc_controller ftc_plant; do
-    cp --update "target/fmu/lib$name.so" "$folder/$name.so"
+    cp --update "target/fmu/lib${name}_fmu.so" "$folder/$name.so"
     touch "$folder/$name.so"
 done

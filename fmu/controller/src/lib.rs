@@ -1,4 +1,4 @@
-//! The controller FMU: a [`Slave`] over [`ftc::control`].
+//! The controller FMU: a [`Slave`] over [`ftc_control`].
 //!
 //! The binary is generic; `resources/design.json` makes it the controller of one plant. It works
 //! when a tick begins: it samples the measurements and publishes the command at once, so a master
@@ -6,7 +6,7 @@
 
 use fmu_abi::clock::Event;
 use fmu_abi::{Refusal, Slave, Values, nearest_mode, require_finite, resource, selected_mode};
-use ftc::control::{Change, Compensate, Controller, ControllerState, Sample};
+use ftc_control::{Change, Compensate, Controller, ControllerState, Sample};
 use model_description::{CONTROLLER, DESIGN_FILE, Interface, Role, Span, VariableTable};
 use std::path::Path;
 

@@ -3,7 +3,7 @@
 use fmu_host::model::example;
 use fmu_host::types::Status;
 use fmu_host::{Counting, Instance, Model, assert_nothing_is_allocated};
-use ftc_controller as _;
+use ftc_controller_fmu as _;
 
 #[global_allocator]
 static COUNTING: Counting = Counting;

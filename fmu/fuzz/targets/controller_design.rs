@@ -3,7 +3,7 @@
 #![no_main]
 
 use fmu_fuzz::design::{Edit, forge};
-use ftc_controller::ControllerFmu;
+use ftc_controller_fmu::ControllerFmu;
 use libfuzzer_sys::fuzz_target;
 
 fuzz_target!(|edits: Vec<Edit>| forge::<ControllerFmu>("ftc_controller", &edits));

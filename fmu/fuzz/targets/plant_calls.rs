@@ -5,7 +5,7 @@
 use fmu_host::model::example;
 use fmu_host::random_calls::{Call, fresh, play};
 use fmu_host::{Instance, Model};
-use ftc_plant as _;
+use ftc_plant_fmu as _;
 use libfuzzer_sys::fuzz_target;
 
 thread_local! {

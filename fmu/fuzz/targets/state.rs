@@ -6,7 +6,7 @@ use fmu_host::model::example;
 use fmu_host::random_calls::{Call, fresh, play};
 use fmu_host::types::Status;
 use fmu_host::{Instance, Model};
-use ftc_controller as _;
+use ftc_controller_fmu as _;
 use libfuzzer_sys::fuzz_target;
 use std::sync::LazyLock;
 

@@ -106,7 +106,7 @@ impl Library {
 
 fn beside(program: &Path, name: &str) -> PathBuf {
     let file = format!(
-        "{}{name}{}",
+        "{}{name}_fmu{}",
         std::env::consts::DLL_PREFIX,
         std::env::consts::DLL_SUFFIX
     );

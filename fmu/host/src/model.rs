@@ -4,10 +4,11 @@
 mod common;
 
 use common::Channel;
-use ftc::control::{Compensate, Controller, Sample};
-use ftc::design::{Design, FORMAT, Signal, Signals};
-use ftc::simulate::plant::External;
-use ftc::simulate::{PlantSimulator, Truth};
+use ftc_control::{Compensate, Controller, Sample};
+use ftc_design::{Design, FORMAT, Signal, Signals};
+use ftc_plant::Truth;
+use ftc_simulate::PlantSimulator;
+use ftc_simulate::plant::External;
 use model_description::{CONTROLLER, Interface, PLANT, VariableTable};
 use std::path::Path;
 use tempfile::TempDir;

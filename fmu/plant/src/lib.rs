@@ -1,4 +1,4 @@
-//! The plant FMU: a [`Slave`] over [`ftc::simulate::PlantSimulator`], to try the controller against.
+//! The plant FMU: a [`Slave`] over [`ftc_simulate::PlantSimulator`], to try the controller against.
 //!
 //! It latches its inputs when a tick begins and publishes what they lead to when the tick ends,
 //! so its outputs at a communication point are those of that very instant, whatever the step.
@@ -7,9 +7,9 @@
 
 use fmu_abi::clock::Event;
 use fmu_abi::{Refusal, Slave, Values, nearest_mode, require_finite, resource, selected_mode};
-use ftc::simulate::integrate::Stalled;
-use ftc::simulate::plant::{Change, External};
-use ftc::simulate::{PlantSimulator, PlantState};
+use ftc_simulate::integrate::Stalled;
+use ftc_simulate::plant::{Change, External};
+use ftc_simulate::{PlantSimulator, PlantState};
 use model_description::{DESIGN_FILE, Interface, PLANT, Role, Span, VariableTable};
 use std::path::Path;
 

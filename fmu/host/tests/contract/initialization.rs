@@ -3,7 +3,7 @@
 use fmu_host::model::example;
 use fmu_host::types::Status;
 use fmu_host::{Instance, Library, Model};
-use ftc::design::Design;
+use ftc_design::Design;
 
 /// The example, its second mode at rest elsewhere.
 fn two_resting_places() -> Design {

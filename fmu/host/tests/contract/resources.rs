@@ -3,7 +3,7 @@
 use crate::Pair;
 use fmu_host::model::location;
 use fmu_host::{Instance, Model};
-use ftc::design::FORMAT;
+use ftc_design::FORMAT;
 use std::fs;
 
 /// What the log says when the resource of binary 0 or 1 is `bytes`, under the model's own guid.

@@ -1,0 +1,117 @@
+//! How one tick's outputs follow a small change of its measurement and reference.
+//!
+//! Between its decisions a tick is affine: with `D` the diagonal of flagged sensors,
+//!
+//! ```text
+//! dr = dy     df_hat = D dr     dy_c = dy - df_hat     dx_hat = H dy_c     du = K dx_hat + N dy_ref
+//! ```
+//!
+//! and a bumpless switch adds `G dZ`, the printed additive control `-K C^+ df_hat`. Flags, lost
+//! sensors and inputs at their limits do not move. Through the integrators a reference acts from
+//! the next tick on: of this tick's outputs it moves the command alone, by the feedforward.
+
+use super::{Compensate, Controller, ControllerState, Sample, readings};
+use crate::compensation::is_measurement;
+use crate::kernel;
+
+/// A small change of what a tick is told.
+#[derive(Clone, Copy, Debug)]
+pub struct Change<'a> {
+    /// `dy` (p).
+    pub measurement: &'a [f64],
+    /// `dy_ref` (r).
+    pub reference: &'a [f64],
+}
+
+impl Controller {
+    /// Runs a tick on `trial`, then turns its command, state estimate, residual and fault
+    /// estimate into their changes for a small change of the sample.
+    ///
+    /// What else is in `trial` means nothing afterwards: give a copy.
+    pub fn differentiate(
+        &self,
+        trial: &mut ControllerState,
+        sample: &Sample<'_>,
+        change: Change<'_>,
+    ) {
+        let dy = change.measurement;
+        let mode = sample.mode.min(self.modes.len().saturating_sub(1));
+        let left = trial.mode.unwrap_or(mode);
+        self.tick(trial, sample);
+        let (estimator, observer) = (&self.parameters.estimator, &self.parameters.observer);
+        let screened = trial.repetition.screened();
+        trial.estimator.differentiate(estimator, mode, screened, dy);
+        self.differentiate_correction(trial, sample, dy);
+        let corrected = &trial.corrected;
+        trial
+            .observer
+            .differentiate(observer, left, mode, corrected);
+        self.differentiate_command(trial, left, mode, sample.compensate, change.reference);
+    }
+
+    /// `dy_c`, where the measurement is one.
+    fn differentiate_correction(
+        &self,
+        trial: &mut ControllerState,
+        sample: &Sample<'_>,
+        dy: &[f64],
+    ) {
+        let subtracted = self.takes_out_the_estimate(sample);
+        let believed = readings(&trial.repetition, sample);
+        let changes = trial.estimator.fault.iter().zip(believed).zip(dy);
+        let readings = trial
+            .corrected
+            .iter_mut()
+            .zip(trial.open_loop.contradicted());
+        for ((corrected, &overruled), ((&fault, &y), &dy)) in readings.zip(changes) {
+            let change = if subtracted { dy - fault } else { dy };
+            let seen = if is_measurement(y) && !(subtracted && overruled) {
+                change
+            } else {
+                0.0
+            };
+            *corrected = kernel::bounded_change(*corrected, seen);
+        }
+    }
+
+    /// `du`, zero where the command is at a limit.
+    fn differentiate_command(
+        &self,
+        trial: &mut ControllerState,
+        left: usize,
+        mode: usize,
+        compensate: Compensate<'_>,
+        reference: &[f64],
+    ) {
+        let Some(gains) = self.parameters.feedback.modes.get(mode) else {
+            return;
+        };
+        let estimate = &trial.observer.estimate;
+        let change = &mut trial.acting;
+        change.fill(0.0);
+        kernel::add_product(change, &gains.state_feedback, estimate);
+        kernel::add_product(change, &gains.feedforward, reference);
+        if left != mode && self.parameters.feedback.bumpless {
+            // The integral part takes up what the estimate would have moved.
+            trial.deviation.fill(0.0);
+            kernel::add_scaled(&mut trial.deviation, -1.0, change);
+            trial.integral.fill(0.0);
+            kernel::add_product(
+                &mut trial.integral,
+                &gains.integral_inverse,
+                &trial.deviation,
+            );
+            kernel::add_product(change, &gains.integral, &trial.integral);
+        }
+        if trial.additive.is_some() && compensate == Compensate::Estimate {
+            trial.substitute.fill(0.0);
+            kernel::add_scaled(&mut trial.substitute, -1.0, &trial.estimator.fault);
+            kernel::add_product(change, &gains.output_feedback, &trial.substitute);
+        }
+        let changes = trial.excess.iter().zip(&trial.acting);
+        for (command, (&excess, &change)) in trial.command.iter_mut().zip(changes) {
+            let free = if excess == 0.0 { change } else { 0.0 };
+            *command = kernel::bounded_change(*command, free);
+        }
+    }
+}

@@ -1,0 +1,217 @@
+//! Gated adaptation of the response: the database goes on growing while all is well.
+//!
+//! Recursive least squares without forgetting continues the fit of the database with healthy
+//! samples, so it starts from everything the database knows and moves the less the more it has
+//! seen. It must be unable to do harm, hence:
+//!
+//! * no decision depends on it: sensors are judged by the database alone, and only the estimate of a
+//!   fault that is declared, or of a reading that is missing, is refined. Otherwise a fault that
+//!   grows below its threshold would be followed, and never declared;
+//! * it learns only from samples in which every sensor was judged healthy and the database's error
+//!   was small: a few noise deviations, and a share of what is predicted. A plant that changed errs
+//!   in proportion to what it does; a fault that hides does not;
+//! * what it adds to a prediction keeps within the same bounds, whatever it has learned;
+//! * it is used, sensor by sensor, only while its predictions have been better than those of the
+//!   database alone, both judged before learning from the sample.
+
+use crate::kernel;
+use crate::parameters::Predictor;
+use nalgebra::DMatrix;
+use serde::{Deserialize, Serialize};
+
+/// Share of the past in the running mean of squared errors.
+const MEMORY: f64 = 0.99;
+
+/// The adapted error must be this much smaller than the database's before it is preferred.
+const ADVANTAGE: f64 = 0.98;
+
+/// Largest change of an output that is believed, relative to the database's prediction of it.
+const BELIEVABLE: f64 = 0.05;
+
+/// The same where next to nothing is predicted, in noise deviations.
+const SIGMAS: f64 = 3.0;
+
+/// The adapted response of one mode, with `q = m j` regressors.
+#[derive(Debug, PartialEq, Serialize, Deserialize)]
+pub struct Adaptation {
+    /// Adapted less database response (p x q, row after row).
+    change: Vec<f64>,
+    /// Covariance in units of the noise variance (q x q, symmetric).
+    covariance: Vec<f64>,
+    /// Covariance times regressor (q).
+    direction: Vec<f64>,
+    /// What the change would add to the prediction, as learned (p).
+    addition: Vec<f64>,
+    /// The largest change of each output that is believed in this sample (p).
+    room: Vec<f64>,
+    /// Running means of the squared errors of the database's prediction (p).
+    fixed_error: Vec<f64>,
+    /// And of the adapted one (p).
+    adapted_error: Vec<f64>,
+}
+
+crate::state!(Adaptation {
+    parts: [
+        change,
+        covariance,
+        direction,
+        addition,
+        room,
+        fixed_error,
+        adapted_error
+    ],
+    constants: [],
+    counters: []
+});
+
+impl Adaptation {
+    /// Nothing learned beyond the database.
+    pub fn new(predictor: &Predictor) -> Self {
+        let (outputs, size) = predictor.response.shape();
+        Self {
+            change: vec![0.0; outputs * size],
+            covariance: covariance(&predictor.factor),
+            direction: vec![0.0; size],
+            addition: vec![0.0; outputs],
+            room: vec![0.0; outputs],
+            fixed_error: vec![0.0; outputs],
+            adapted_error: vec![0.0; outputs],
+        }
+    }
+
+    /// Takes in a sample's `regressor` (q) and the database's `prediction` (p) from it; `y0` (p) is the
+    /// output of the mode's operating point.
+    pub fn predict(
+        &mut self,
+        predictor: &Predictor,
+        regressor: &[f64],
+        y0: &[f64],
+        prediction: &[f64],
+    ) {
+        let size = regressor.len().max(1);
+        let rows = self.change.chunks_exact(size);
+        for (sum, row) in self.addition.iter_mut().zip(rows) {
+            *sum = kernel::bounded(kernel::dot(row, regressor));
+        }
+        let outputs = prediction.iter().zip(y0).zip(&predictor.deviation);
+        for (room, ((value, centre), deviation)) in self.room.iter_mut().zip(outputs) {
+            *room = kernel::bounded(BELIEVABLE * (value - centre).abs() + SIGMAS * deviation);
+        }
+    }
+
+    /// What to add to the database's prediction of each sensor (p): nothing where that did not prove better.
+    pub fn additions(&self) -> impl Iterator<Item = f64> {
+        let scores = self.fixed_error.iter().zip(&self.adapted_error);
+        let additions = self.addition.iter().zip(&self.room);
+        additions
+            .zip(scores)
+            .map(|((&addition, &room), (&fixed, &adapted))| {
+                if adapted < ADVANTAGE * fixed {
+                    addition.clamp(-room, room)
+                } else {
+                    0.0
+                }
+            })
+    }
+
+    /// Learns from a healthy sample, the one last [predicted](Self::predict). `error` (p) is that of the
+    /// database's prediction.
+    pub fn learn(&mut self, regressor: &[f64], error: &[f64]) {
+        let believable = |(error, room): (&f64, &f64)| error.abs() <= *room;
+        if !error.iter().zip(&self.room).all(believable) {
+            return;
+        }
+        let size = regressor.len().max(1);
+        let rows = self.covariance.chunks_exact(size);
+        for (value, row) in self.direction.iter_mut().zip(rows) {
+            *value = kernel::dot(row, regressor);
+        }
+        let scale = 1.0 / (1.0 + kernel::dot(&self.direction, regressor).max(0.0));
+        let rows = self.change.chunks_exact_mut(size).zip(&self.addition);
+        let scores = self.fixed_error.iter_mut().zip(&mut self.adapted_error);
+        let errors = error.iter().zip(&self.room);
+        for (((row, &addition), (&error, &room)), (fixed, adapted)) in rows.zip(errors).zip(scores)
+        {
+            remember(fixed, error);
+            remember(adapted, error - addition.clamp(-room, room));
+            kernel::add_scaled(row, scale * (error - addition), &self.direction);
+            kernel::bound(row);
+        }
+        kernel::subtract_square(&mut self.covariance, scale, &self.direction);
+        kernel::bound(&mut self.covariance);
+    }
+}
+
+/// Takes an error into a running mean of squares.
+fn remember(mean: &mut f64, error: f64) {
+    *mean = kernel::bounded(MEMORY * *mean + (1.0 - MEMORY) * error * error);
+}
+
+/// `(R'R)^-1`, row after row: what the database leaves open.
+fn covariance(factor: &DMatrix<f64>) -> Vec<f64> {
+    let size = factor.nrows();
+    let inverse = factor
+        .solve_upper_triangular(&DMatrix::identity(size, size))
+        .unwrap_or_else(|| DMatrix::zeros(size, size));
+    let product = &inverse * inverse.transpose();
+    let covariance = 0.5 * (&product + product.transpose());
+    covariance.iter().map(|&v| kernel::bounded(v)).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn predictor(response: &[f64], information: f64) -> Predictor {
+        Predictor {
+            response: DMatrix::from_row_slice(1, response.len(), response),
+            factor: DMatrix::identity(response.len(), response.len()) * information.sqrt(),
+            deviation: vec![0.01],
+            samples: 100,
+        }
+    }
+
+    /// Feeds a plant with another response than the database's; returns the last prediction errors.
+    fn adapt(truth: &[f64], known: &Predictor, ticks: u32) -> (f64, f64) {
+        let mut adaptation = Adaptation::new(known);
+        let mut last = (0.0, 0.0);
+        for k in 0..ticks {
+            let phi = [f64::from(k).sin(), f64::from(2 * k).cos()];
+            let fixed = kernel::dot(known.response.as_slice(), &phi);
+            adaptation.predict(known, &phi, &[0.0], &[fixed]);
+            let error = kernel::dot(truth, &phi) - fixed;
+            last = (error, error - adaptation.additions().sum::<f64>());
+            adaptation.learn(&phi, &[error]);
+        }
+        last
+    }
+
+    #[test]
+    fn a_wrong_database_is_corrected() {
+        let (fixed, adapted) = adapt(&[1.02, 0.49], &predictor(&[1.0, 0.5], 10.0), 4000);
+        assert!(
+            adapted.abs() < 0.02 * fixed.abs(),
+            "{adapted} against {fixed}"
+        );
+    }
+
+    #[test]
+    fn a_response_that_strays_is_not_believed() {
+        let (fixed, adapted) = adapt(&[-3.0, 0.5], &predictor(&[1.0, 0.5], 10.0), 4000);
+        assert!(adapted.abs() <= fixed.abs() + 1e-12);
+    }
+
+    /// A fault that grows slowly enough to stay unseen was once followed to any size.
+    #[test]
+    fn a_fault_that_grows_unseen_is_not_followed() {
+        let known = predictor(&[1.0, 0.5], 10.0);
+        let mut adaptation = Adaptation::new(&known);
+        for k in 0..4000 {
+            let phi = [1.0, 0.2];
+            adaptation.predict(&known, &phi, &[0.0], &[1.1]);
+            adaptation.learn(&phi, &[1e-3 * f64::from(k)]);
+            let added: f64 = adaptation.additions().sum();
+            assert!(added <= BELIEVABLE * 1.1 + SIGMAS * 0.01, "{added} at {k}");
+        }
+    }
+}

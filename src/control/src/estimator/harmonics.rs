@@ -1,0 +1,238 @@
+//! The response to the periodic disturbance, learned while no fault is declared.
+//!
+//! With the period known, the disturbance adds to each output a sum of sines and cosines whose
+//! coefficients are not known beforehand. Recursive least squares with forgetting learns them;
+//! the regressor is the same for every sensor, so one covariance serves all. While a fault is
+//! declared nothing is learned and the last coefficients extrapolate.
+
+use crate::kernel;
+use crate::parameters::{Harmonics, PhasorMap};
+use serde::{Deserialize, Serialize};
+
+/// Learned coefficients of one mode, with `q = 2 x harmonics` regressors.
+#[derive(Debug, PartialEq, Serialize, Deserialize)]
+pub struct HarmonicState {
+    /// Coefficients per sensor (p x q, row after row).
+    coefficients: Vec<f64>,
+    /// Covariance in units of the noise variance (q x q, symmetric).
+    covariance: Vec<f64>,
+    /// `[sin(w k), cos(w k), sin(2 w k), ...]` (q).
+    regressor: Vec<f64>,
+    /// Covariance times regressor (q).
+    direction: Vec<f64>,
+    /// Samples learned from.
+    samples: u64,
+}
+
+crate::state!(HarmonicState {
+    parts: [coefficients, covariance, regressor, direction],
+    constants: [],
+    counters: [samples]
+});
+
+/// Samples per coefficient before a response counts as known.
+const SAMPLES_PER_COEFFICIENT: u64 = 4;
+
+/// How far a response carried over from another mode may be wrong, relative to its size.
+const TRANSFER_ERROR: f64 = 0.1;
+
+impl HarmonicState {
+    /// Nothing learned yet.
+    pub fn new(harmonics: &Harmonics, outputs: usize) -> Self {
+        let size = 2 * harmonics.count;
+        let mut covariance = vec![0.0; size * size];
+        covariance
+            .iter_mut()
+            .step_by(size + 1)
+            .for_each(|v| *v = harmonics.initial_variance);
+        Self {
+            coefficients: vec![0.0; outputs * size],
+            covariance,
+            regressor: vec![0.0; size],
+            direction: vec![0.0; size],
+            samples: 0,
+        }
+    }
+
+    /// Sets the regressor of tick `tick`.
+    pub fn rotate(&mut self, harmonics: &Harmonics, tick: u64) {
+        let turns = libm::fmod(tick as f64, harmonics.period) / harmonics.period;
+        for (index, pair) in self.regressor.chunks_exact_mut(2).enumerate() {
+            let angle = core::f64::consts::TAU * turns * (index + 1) as f64;
+            if let [sine, cosine] = pair {
+                (*sine, *cosine) = libm::sincos(angle);
+            }
+        }
+    }
+
+    /// Adds the learned response to `outputs` (p).
+    pub fn add_response(&self, outputs: &mut [f64]) {
+        for (output, response) in outputs.iter_mut().zip(self.responses()) {
+            *output += response;
+        }
+    }
+
+    /// Variance of the learned response, in units of the noise variance.
+    pub fn leverage(&mut self) -> f64 {
+        let size = self.regressor.len().max(1);
+        for (value, row) in self
+            .direction
+            .iter_mut()
+            .zip(self.covariance.chunks_exact(size))
+        {
+            *value = kernel::dot(row, &self.regressor);
+        }
+        kernel::dot(&self.direction, &self.regressor).max(0.0)
+    }
+
+    /// The sines and cosines of the last [`rotate`](Self::rotate) (q).
+    pub fn regressor(&self) -> &[f64] {
+        &self.regressor
+    }
+
+    /// The learned response of each sensor.
+    pub fn responses(&self) -> impl Iterator<Item = f64> {
+        let size = self.regressor.len().max(1);
+        let rows = self.coefficients.chunks_exact(size);
+        rows.map(|row| kernel::dot(row, &self.regressor))
+    }
+
+    /// Replaces what was learned of one sensor (q).
+    pub fn replace(&mut self, sensor: usize, waves: &[f64]) {
+        let size = self.regressor.len().max(1);
+        if let Some(row) = self.coefficients.chunks_exact_mut(size).nth(sensor) {
+            kernel::copy(row, waves);
+        }
+    }
+
+    /// Whether enough was learned to say something of another mode.
+    pub fn is_known(&self) -> bool {
+        self.samples >= SAMPLES_PER_COEFFICIENT * self.regressor.len() as u64
+    }
+
+    /// Whether a whole period has been learned from.
+    pub fn is_settled(&self, harmonics: &Harmonics) -> bool {
+        self.samples as f64 >= harmonics.period
+    }
+
+    /// Starts from what `other` learned in another mode; `deviations` (p) are the sensors' noise levels.
+    pub fn carry_over(
+        &mut self,
+        other: &Self,
+        maps: &[PhasorMap],
+        deviations: impl Iterator<Item = f64> + Clone,
+    ) {
+        let size = self.regressor.len().max(1);
+        self.coefficients.fill(0.0);
+        for (harmonic, map) in maps.iter().enumerate() {
+            let (sine, cosine) = (2 * harmonic, 2 * harmonic + 1);
+            for (row, to) in self.coefficients.chunks_exact_mut(size).enumerate() {
+                for (column, from) in other.coefficients.chunks_exact(size).enumerate() {
+                    let (Some(&re), Some(&im)) = (
+                        map.real.get((row, column)),
+                        map.imaginary.get((row, column)),
+                    ) else {
+                        continue;
+                    };
+                    if let (Some(&a), Some(&b)) = (from.get(sine), from.get(cosine)) {
+                        add_at(to, sine, re * a - im * b);
+                        add_at(to, cosine, im * a + re * b);
+                    }
+                }
+            }
+        }
+        kernel::bound(&mut self.coefficients);
+        let rows = self.coefficients.chunks_exact(size).zip(deviations);
+        let doubt = rows
+            .map(|(row, deviation)| TRANSFER_ERROR * libm::sqrt(kernel::dot(row, row)) / deviation)
+            .fold(0.0, f64::max);
+        kernel::copy(&mut self.covariance, &other.covariance);
+        let variance = kernel::bounded(doubt * doubt);
+        self.covariance
+            .iter_mut()
+            .step_by(size + 1)
+            .for_each(|v| *v = kernel::bounded(*v + variance));
+    }
+
+    /// One step of recursive least squares on the residuals (p) of a healthy sample.
+    /// Call [`rotate`](Self::rotate) and [`leverage`](Self::leverage) of the same tick first.
+    pub fn learn(&mut self, harmonics: &Harmonics, residual: &[f64]) {
+        self.samples = self.samples.saturating_add(1);
+        let size = self.regressor.len().max(1);
+        let keep = 1.0 - 1.0 / harmonics.memory.max(2.0);
+        let scale = 1.0 / (keep + kernel::dot(&self.direction, &self.regressor).max(0.0));
+        for (row, &error) in self.coefficients.chunks_exact_mut(size).zip(residual) {
+            kernel::add_scaled(row, scale * error, &self.direction);
+            kernel::bound(row);
+        }
+        kernel::subtract_square(&mut self.covariance, scale, &self.direction);
+        for value in &mut self.covariance {
+            *value = kernel::bounded(*value / keep);
+        }
+    }
+}
+
+/// Adds to one entry of a slice.
+fn add_at(values: &mut [f64], index: usize, amount: f64) {
+    if let Some(value) = values.get_mut(index) {
+        *value += amount;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Rounding once made the covariance asymmetric, and forgetting let that grow until, after some
+    /// ten thousand samples, healthy sensors were accused.
+    #[test]
+    fn learning_for_ever_stays_sound() {
+        let harmonics = Harmonics {
+            period: 71.11350685098513,
+            count: 2,
+            memory: 200.0,
+            initial_variance: 33.4,
+        };
+        let mut state = HarmonicState::new(&harmonics, 1);
+        let mut noise = [0.0];
+        for k in 0..300_000 {
+            ftc_plant::noise::standard_normal(5, k, &mut noise);
+            state.rotate(&harmonics, k);
+            let leverage = state.leverage();
+            let mut predicted = [0.0];
+            state.add_response(&mut predicted);
+            let truth = libm::sin(core::f64::consts::TAU * k as f64 / harmonics.period);
+            state.learn(&harmonics, &[truth + 0.01 * noise[0] - predicted[0]]);
+            assert!(k < 1000 || leverage < 0.1, "leverage {leverage} at {k}");
+            assert!(
+                k < 1000 || (truth - predicted[0]).abs() < 0.02,
+                "error at {k}"
+            );
+        }
+    }
+
+    #[test]
+    fn learns_amplitude_and_phase_of_every_harmonic() {
+        let harmonics = Harmonics {
+            period: 31.7,
+            count: 2,
+            memory: 400.0,
+            initial_variance: 1e6,
+        };
+        let mut state = HarmonicState::new(&harmonics, 1);
+        let truth = |k: u64| {
+            let angle = core::f64::consts::TAU * k as f64 / harmonics.period;
+            0.7 * libm::sin(angle + 0.3) - 0.2 * libm::sin(2.0 * angle + 1.1)
+        };
+        let mut error = f64::INFINITY;
+        for k in 0..200 {
+            state.rotate(&harmonics, k);
+            state.leverage();
+            let mut predicted = [0.0];
+            state.add_response(&mut predicted);
+            error = truth(k) - predicted[0];
+            state.learn(&harmonics, &[error]);
+        }
+        assert!(error.abs() < 1e-6, "still {error} off after six periods");
+    }
+}

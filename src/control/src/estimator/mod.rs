@@ -1,0 +1,433 @@
+//! The sensor-fault estimator: data-based projection with a reference window (41)-(62).
+//!
+//! A healthy database of inputs `U1` and outputs `Y1` fixes, by projection, what the output must
+//! be: `y_hat = y0 + Y1 U1^+ phi` (`predictor`). What the periodic disturbance adds is learned
+//! on line while all is well (`harmonics`). The residual is what remains; each sensor's residual
+//! is judged against its own threshold (`decision`), widened by how far the present input lies
+//! from those the database knows.
+
+mod adaptation;
+mod decision;
+mod derivative;
+mod harmonics;
+mod predictor;
+mod recovery;
+mod window;
+
+pub use adaptation::Adaptation;
+pub use decision::{Decision, Verdict};
+pub use harmonics::HarmonicState;
+pub use predictor::{InputHistory, leverage};
+pub use recovery::Recovery;
+pub use window::SlidingWindow;
+
+use super::compensation::is_measurement;
+use super::kernel;
+use super::parameters::{Estimator, EstimatorMethod};
+use serde::{Deserialize, Serialize};
+
+/// How many noise deviations a threshold usually is.
+const USUAL_SIGMAS: f64 = 6.0;
+
+/// Only residuals below this share of their threshold are learned from: a fault that grows out of
+/// nothing, or hides just below its threshold, must not be taken for the disturbance.
+const QUIET: f64 = 0.5;
+
+/// How far a residual can be trusted.
+#[derive(Clone, Copy, Debug)]
+struct Trust {
+    /// By how much its threshold is widened: the prediction's deviation over that of the noise.
+    widening: f64,
+    /// Whether a residual within the widened threshold clears an accused sensor.
+    clears: bool,
+    /// Whether something may be learned from it.
+    teaches: bool,
+}
+
+impl Trust {
+    /// As much as a threshold assumes.
+    const FULL: Self = Self {
+        widening: 1.0,
+        clears: true,
+        teaches: true,
+    };
+
+    /// What a threshold is multiplied by. Where little is known, the wide threshold keeps a healthy
+    /// sensor from being accused, but an accused one is cleared by nothing less than the narrow one:
+    /// its residual goes on being followed, since an estimate that stood still would leave the loop
+    /// without feedback.
+    fn factor(&self, accused: bool) -> f64 {
+        if accused && !self.clears {
+            1.0
+        } else {
+            self.widening
+        }
+    }
+}
+
+/// Where the input lies beyond what the database spans, a prediction is trusted all the same if its
+/// deviation is below this share of what it predicts. A loop closed over a less precise one may diverge.
+const PRECISE: f64 = 0.01;
+
+/// One sample as the estimator sees it.
+#[derive(Clone, Copy, Debug)]
+pub struct Observation<'a> {
+    /// Number of the tick.
+    pub tick: u64,
+    /// Active mode (0-based).
+    pub mode: usize,
+    /// Input of the mode's operating point (m).
+    pub u0: &'a [f64],
+    /// Output of the mode's operating point (p).
+    pub y0: &'a [f64],
+    /// Measurement (p).
+    pub y: &'a [f64],
+    /// Decision thresholds (p).
+    pub thresholds: &'a [f64],
+}
+
+/// What the estimator remembers, and what it last said.
+#[derive(Debug, PartialEq, Serialize, Deserialize)]
+pub struct EstimatorState {
+    history: InputHistory,
+    /// Ticks until the regressor again holds inputs of the present mode only.
+    hold: usize,
+    /// Whether the last residual could be judged, per sensor (p).
+    judged: Vec<bool>,
+    /// Per mode: the learned response to the periodic disturbance.
+    harmonics: Vec<HarmonicState>,
+    /// Watches accused sensors for a wrongly learned disturbance.
+    recovery: Option<Recovery>,
+    /// Per mode: the adapted response; empty unless adaptation is on.
+    adaptations: Vec<Adaptation>,
+    decisions: Vec<Decision>,
+    /// The window of the printed method, where it is chosen.
+    window: Option<SlidingWindow>,
+    /// Predicted output `y_hat` (p).
+    pub prediction: Vec<f64>,
+    /// Residual `r_c = y - y_hat` (p); keeps its last value where the measurement is not a number.
+    pub residual: Vec<f64>,
+    /// Fault estimate `f_hat` (p); zero while no fault is declared.
+    pub fault: Vec<f64>,
+    /// Whether a fault is declared, per sensor (p).
+    pub flagged: Vec<bool>,
+}
+
+crate::state!(EstimatorState {
+    parts: [
+        history,
+        harmonics,
+        recovery,
+        adaptations,
+        decisions,
+        window,
+        judged,
+        prediction,
+        residual,
+        fault,
+        flagged
+    ],
+    constants: [],
+    counters: [hold]
+});
+
+impl EstimatorState {
+    /// Nothing seen yet: `inputs` is the command that has acted so far (m).
+    pub fn new(estimator: &Estimator, inputs: &[f64], outputs: usize) -> Self {
+        let modes = estimator.predictors.len().max(1);
+        let harmonics = (0..modes)
+            .filter_map(|_| {
+                estimator
+                    .harmonics
+                    .as_ref()
+                    .map(|h| HarmonicState::new(h, outputs))
+            })
+            .collect();
+        Self {
+            history: InputHistory::new(inputs, estimator.response_length),
+            hold: estimator.response_length,
+            judged: vec![false; outputs],
+            harmonics,
+            recovery: estimator
+                .harmonics
+                .as_ref()
+                .map(|h| Recovery::new(h, outputs)),
+            adaptations: if estimator.adapt {
+                estimator.predictors.iter().map(Adaptation::new).collect()
+            } else {
+                Vec::new()
+            },
+            window: (estimator.method == EstimatorMethod::Sliding).then(|| {
+                SlidingWindow::new(
+                    inputs.len() * estimator.response_length,
+                    outputs,
+                    estimator.window,
+                )
+            }),
+            decisions: vec![Decision::default(); outputs],
+            prediction: vec![0.0; outputs],
+            residual: vec![0.0; outputs],
+            fault: vec![0.0; outputs],
+            flagged: vec![false; outputs],
+        }
+    }
+
+    /// Called on leaving mode `from` for mode `to`: the regressor mixes modes for `response_length`
+    /// samples, and a mode never learned in starts from what the other taught.
+    pub fn mode_entered(
+        &mut self,
+        estimator: &Estimator,
+        from: usize,
+        to: usize,
+        thresholds: &[f64],
+    ) {
+        self.hold = estimator.response_length;
+        if let Some(window) = &mut self.window {
+            window.clear();
+        }
+        let maps = estimator
+            .harmonic_transfers
+            .get(from)
+            .and_then(|row| row.get(to));
+        if let Some(maps) = maps
+            && let Ok([left, entered]) = self.harmonics.get_disjoint_mut([from, to])
+            && left.is_known()
+            && !entered.is_known()
+        {
+            let deviations = thresholds
+                .iter()
+                .map(|t| (t / USUAL_SIGMAS).max(f64::MIN_POSITIVE));
+            entered.carry_over(left, maps, deviations);
+        }
+    }
+
+    /// Puts the prediction in place of `expected` outputs (p), where it can be trusted now.
+    pub fn predict_into(&self, estimator: &Estimator, expected: &mut [f64]) {
+        if estimator.method != EstimatorMethod::Reference {
+            return;
+        }
+        let known = self.prediction.iter().zip(&self.judged);
+        for (output, (&predicted, &judged)) in expected.iter_mut().zip(known) {
+            if judged {
+                *output = predicted;
+            }
+        }
+    }
+
+    /// Which sensors (p) are accused and could not be judged anew, so that their estimate stands still.
+    pub fn held<'a>(&'a self, estimator: &Estimator) -> impl Iterator<Item = bool> + Clone + 'a {
+        let reference = estimator.method == EstimatorMethod::Reference;
+        let sensors = self.flagged.iter().zip(&self.judged);
+        sensors.map(move |(&flagged, &judged)| reference && flagged && !judged)
+    }
+
+    /// Whether an accused sensor has no trusted prediction to stand in for it.
+    pub fn leans_on_the_model(&self, estimator: &Estimator) -> bool {
+        let predicts = estimator.method == EstimatorMethod::Reference;
+        let mut sensors = self.flagged.iter().zip(&self.judged);
+        sensors.any(|(&flagged, &judged)| flagged && !(predicts && judged))
+    }
+
+    /// Judges one sample, sensor by sensor.
+    pub fn observe(&mut self, estimator: &Estimator, seen: &Observation<'_>) {
+        self.history.regress(seen.u0);
+        let trust = match estimator.method {
+            EstimatorMethod::Reference => self.predict(estimator, seen),
+            EstimatorMethod::Sliding => self.slide(seen),
+            EstimatorMethod::None => None,
+        };
+        let healthy = self.decide(estimator, seen, trust);
+        let corrected = self.reconsider(estimator, seen);
+        if healthy && !corrected {
+            self.learn(estimator, seen.mode);
+        }
+        self.refine(estimator, seen);
+        self.hold = self.hold.saturating_sub(1);
+    }
+
+    /// Adds what adaptation learned to prediction and residual, and to the estimate of every declared
+    /// fault that was judged anew; the flags stay.
+    fn refine(&mut self, estimator: &Estimator, seen: &Observation<'_>) {
+        if estimator.method != EstimatorMethod::Reference {
+            return;
+        }
+        let Some(adaptation) = self.adaptations.get(seen.mode) else {
+            return;
+        };
+        let decided = self.flagged.iter().zip(&self.judged);
+        let estimates = self.fault.iter_mut().zip(decided);
+        let signals = self.prediction.iter_mut().zip(&mut self.residual);
+        let limits = seen.y.iter().zip(&estimator.largest_fault);
+        for (
+            ((addition, (prediction, residual)), (fault, (&flagged, &judged))),
+            (&value, &largest),
+        ) in adaptation
+            .additions()
+            .zip(signals)
+            .zip(estimates)
+            .zip(limits)
+        {
+            *prediction = kernel::bounded(*prediction + addition);
+            if is_measurement(value) {
+                *residual = value - *prediction;
+                if flagged && judged {
+                    *fault = residual.clamp(-largest, largest);
+                }
+            }
+        }
+    }
+
+    /// The reference window: leaves prediction and residual, and returns how far to trust them;
+    /// nothing while the regressor mixes modes.
+    fn predict(&mut self, estimator: &Estimator, seen: &Observation<'_>) -> Option<Trust> {
+        self.judged.fill(false);
+        let predictor = estimator.predictors.get(seen.mode)?;
+        kernel::affine(
+            &mut self.prediction,
+            seen.y0,
+            &predictor.response,
+            self.history.regressor(),
+        );
+        if let Some(adaptation) = self.adaptations.get_mut(seen.mode) {
+            let regressor = self.history.regressor();
+            adaptation.predict(predictor, regressor, seen.y0, &self.prediction);
+        }
+        let leverage = self.history.leverage(&predictor.factor);
+        let mut spread = 1.0 + leverage;
+        if let Some(learned) = self.harmonics.get_mut(seen.mode)
+            && let Some(known) = &estimator.harmonics
+        {
+            learned.rotate(known, seen.tick);
+            learned.add_response(&mut self.prediction);
+            spread += learned.leverage();
+        }
+        kernel::bound(&mut self.prediction);
+        let pairs = self.residual.iter_mut().zip(seen.y).zip(&self.prediction);
+        for ((residual, &value), &predicted) in pairs {
+            if is_measurement(value) {
+                *residual = value - predicted;
+            }
+        }
+        let spanned = leverage <= estimator.leverage_limit;
+        let signals = self
+            .prediction
+            .iter()
+            .zip(seen.y0)
+            .zip(&predictor.deviation);
+        for (judged, ((&predicted, &y0), deviation)) in self.judged.iter_mut().zip(signals) {
+            let precise = libm::sqrt(leverage) * deviation <= PRECISE * (predicted - y0).abs();
+            *judged = self.hold == 0 && (spanned || precise);
+        }
+        let most = 1.0 + estimator.leverage_limit;
+        let trust = Trust {
+            widening: libm::sqrt(spread),
+            clears: spread <= most,
+            teaches: spanned,
+        };
+        (self.hold == 0).then_some(trust)
+    }
+
+    /// Takes a healthy sample in: the response to the disturbance first, the plant's own response
+    /// only once the former is known, since the loop's input follows the disturbance too.
+    fn learn(&mut self, estimator: &Estimator, mode: usize) {
+        let mut settled = true;
+        if let Some(learned) = self.harmonics.get_mut(mode)
+            && let Some(known) = &estimator.harmonics
+        {
+            settled = learned.is_settled(known);
+            learned.learn(known, &self.residual);
+        }
+        if settled && let Some(adaptation) = self.adaptations.get_mut(mode) {
+            adaptation.learn(self.history.regressor(), &self.residual);
+        }
+    }
+
+    /// Replaces what was learned of accused sensors that showed nothing but the disturbance for a
+    /// period; says whether there were any.
+    fn reconsider(&mut self, estimator: &Estimator, seen: &Observation<'_>) -> bool {
+        let (Some(recovery), Some(known)) = (&mut self.recovery, &estimator.harmonics) else {
+            return false;
+        };
+        let Some(learned) = self.harmonics.get_mut(seen.mode) else {
+            return false;
+        };
+        if self.hold > 0 || !seen.y.iter().all(|&value| is_measurement(value)) {
+            recovery.restart();
+            return false;
+        }
+        let unexplained = self
+            .residual
+            .iter()
+            .zip(learned.responses())
+            .map(|(r, wave)| r + wave);
+        let sensors = unexplained.zip(self.flagged.iter().copied());
+        if !recovery.watch(known, learned.regressor(), sensors) {
+            return false;
+        }
+        let settled = learned.is_settled(known);
+        let mut corrected = false;
+        for (sensor, &threshold) in seen.thresholds.iter().enumerate() {
+            if let Some(waves) = recovery.acquittal(sensor, threshold, settled) {
+                learned.replace(sensor, waves);
+                corrected = true;
+            }
+        }
+        recovery.restart();
+        corrected
+    }
+
+    /// The sliding window as printed: leaves the residual; nothing until the window is full.
+    fn slide(&mut self, seen: &Observation<'_>) -> Option<Trust> {
+        self.judged.fill(false);
+        let window = self.window.as_mut().filter(|_| self.hold == 0)?;
+        window.residual(self.history.regressor(), seen.y, &mut self.residual);
+        self.judged.fill(window.full());
+        window.full().then_some(Trust::FULL)
+    }
+
+    /// Remembers the input that acts over the coming sample (m).
+    pub fn remember(&mut self, acting: &[f64]) {
+        self.history.push(acting);
+    }
+
+    /// Decides sensor by sensor; `trust` is absent when the residual means nothing now.
+    /// Returns whether the residual was judged and every sensor found healthy beyond suspicion.
+    fn decide(
+        &mut self,
+        estimator: &Estimator,
+        seen: &Observation<'_>,
+        trust: Option<Trust>,
+    ) -> bool {
+        let mut healthy = trust.is_some_and(|trust| trust.teaches);
+        let sensors = self
+            .decisions
+            .iter_mut()
+            .zip(&mut self.fault)
+            .zip(self.flagged.iter_mut().zip(&self.judged));
+        let signals = seen
+            .y
+            .iter()
+            .zip(&self.residual)
+            .zip(seen.thresholds.iter().zip(&estimator.largest_fault));
+        for (((decision, fault), (flagged, &judged)), signals) in sensors.zip(signals) {
+            let ((&value, &residual), (&threshold, &largest)) = signals;
+            let trust = trust.filter(|_| judged);
+            let verdict = if !is_measurement(value) {
+                Some(Verdict::Lost)
+            } else {
+                trust.map(|trust| Verdict::of(residual, trust.factor(*flagged) * threshold))
+            };
+            let Some(verdict) = verdict else { continue };
+            decision.update(verdict, estimator.debounce);
+            *flagged = decision.flagged();
+            *fault = match (*flagged, verdict) {
+                (false, _) => 0.0,
+                (true, Verdict::Lost) => *fault,
+                (true, _) => residual.clamp(-largest, largest),
+            };
+            let quiet = trust.is_some_and(|t| residual.abs() <= QUIET * t.widening * threshold);
+            healthy &= !*flagged && verdict == Verdict::Healthy && quiet;
+        }
+        healthy
+    }
+}

@@ -1,0 +1,91 @@
+//! Sensors that say the very same number again and again.
+//!
+//! A sensor with any noise does not repeat a reading to the last bit; one that has frozen does. Its
+//! residual alone tells this late, and not at all while the true output happens to pass by.
+
+use super::compensation::is_measurement;
+use serde::{Deserialize, Serialize};
+
+/// What a silent sensor says: no measurement, yet equal to itself.
+const SILENCE: f64 = f64::INFINITY;
+
+/// How often each sensor has repeated itself.
+#[derive(Debug, PartialEq, Serialize, Deserialize)]
+pub struct Repetition {
+    /// The last reading of each sensor (p).
+    last: Vec<f64>,
+    /// How many times in a row it has been repeated (p).
+    repeats: Vec<u32>,
+    /// The readings, infinite where a sensor is silent or frozen (p).
+    screened: Vec<f64>,
+}
+
+crate::state!(Repetition {
+    parts: [last, repeats, screened],
+    constants: [],
+    counters: []
+});
+
+impl Repetition {
+    /// Nothing seen of any of the `outputs` sensors.
+    pub fn new(outputs: usize) -> Self {
+        Self {
+            last: vec![SILENCE; outputs],
+            repeats: vec![0; outputs],
+            screened: vec![SILENCE; outputs],
+        }
+    }
+
+    /// Takes a sample's readings (p); one repeated `limit` times in a row is none. A `limit` of zero
+    /// lets everything through.
+    pub fn screen(&mut self, readings: &[f64], limit: u32) -> &[f64] {
+        let seen = self.last.iter_mut().zip(&mut self.repeats);
+        for (((last, repeats), out), &given) in seen.zip(&mut self.screened).zip(readings) {
+            let reading = if is_measurement(given) {
+                given
+            } else {
+                SILENCE
+            };
+            let repeated = reading == *last;
+            *repeats = if repeated {
+                repeats.saturating_add(1)
+            } else {
+                0
+            };
+            *last = reading;
+            let frozen = limit > 0 && *repeats >= limit;
+            *out = if frozen { SILENCE } else { reading };
+        }
+        &self.screened
+    }
+
+    /// The readings of the last sample (p), infinite where a sensor is silent or frozen.
+    pub fn screened(&self) -> &[f64] {
+        &self.screened
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn silent(readings: &[f64], limit: u32) -> Vec<bool> {
+        let mut repetition = Repetition::new(1);
+        let screened = readings
+            .iter()
+            .map(|&value| repetition.screen(&[value], limit)[0] == SILENCE);
+        screened.collect()
+    }
+
+    #[test]
+    fn a_reading_counts_until_it_was_repeated_too_often() {
+        let readings = [1.0, 2.0, 2.0, 2.0, 2.0, 3.0, 3.0];
+        let expected = [false, false, false, true, true, false, false];
+        assert_eq!(silent(&readings, 2), expected);
+    }
+
+    #[test]
+    fn without_a_limit_all_is_let_through() {
+        assert_eq!(silent(&[4.0; 9], 0), [false; 9]);
+    }
+}

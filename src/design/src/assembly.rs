@@ -1,0 +1,414 @@
+//! From what is asked for to a finished design: gains, observer, predictor, thresholds, record.
+
+use super::commissioning::{self, Database, LONGEST_RESPONSE, RecordedDisturbance};
+use super::harmonics;
+use super::{
+    ControlSpec, Design, DesignError, FORMAT, ObserverSpec, Signal, Signals, check_controllable,
+    synthesise,
+};
+use ftc_control::ControllerParameters;
+use ftc_control::parameters::{
+    Compensation, Estimator, EstimatorMethod, Harmonics, Limits, Predictor, StateFeedback,
+};
+use ftc_plant::scaling::Scaling;
+use ftc_plant::{Dimensions, Mode, SwitchedPlant};
+use ftc_plant::{Scenario, Truth};
+
+/// A design that is asked for.
+#[derive(Clone, Debug)]
+pub struct Request {
+    /// Name of the design.
+    pub name: String,
+    /// What the signals are called and measured in.
+    pub signals: Signals,
+    /// The plant as it is designed for.
+    pub plant: SwitchedPlant,
+    /// What the simulated plant really is.
+    pub truth: Truth,
+    /// The state feedback that is asked for.
+    pub control: ControlSpec,
+    /// Whether a mode switch leaves the command where it was.
+    pub bumpless: bool,
+    /// Whether the reference acts on the command at once, or by way of the integrator alone.
+    pub feedforward: bool,
+    /// The observer that is asked for.
+    pub observer: ObserverSpec,
+    /// The fault estimator that is asked for.
+    pub estimator: EstimatorSpec,
+    /// What is done about an estimated fault.
+    pub compensation: Compensation,
+    /// The experiment; its noise is also that of the commissioning run.
+    pub scenario: Scenario,
+}
+
+/// The fault estimator that is asked for.
+#[derive(Clone, Debug, PartialEq)]
+pub struct EstimatorSpec {
+    /// Method.
+    pub method: EstimatorMethod,
+    /// `j` in samples; chosen by [`commissioning::response_length`] when absent.
+    pub response_length: Option<usize>,
+    /// Where the predictor comes from.
+    pub database: DatabaseSource,
+    /// How large a residual must be to be called a fault.
+    pub threshold: Threshold,
+    /// Consecutive samples that raise or release a fault.
+    pub debounce: u32,
+    /// Repetitions of the very same reading after which a sensor is taken for frozen; 0: never.
+    pub stuck_after: u32,
+    /// Whether the response goes on being learned while all is well.
+    pub adapt: bool,
+    /// The periodic disturbance to be learned on line.
+    pub disturbance: Option<KnownDisturbance>,
+}
+
+/// Where the healthy database comes from.
+#[derive(Clone, Debug, PartialEq)]
+pub enum DatabaseSource {
+    /// A commissioning run on the plant model.
+    Commission,
+    /// The model's own Markov parameters.
+    Model,
+    /// Logs of healthy operation: for each mode, the stretches in which it was active.
+    Recorded(Vec<Vec<Database>>),
+}
+
+/// How thresholds are chosen.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Threshold {
+    /// One per sensor (p), in output units.
+    Given(Vec<f64>),
+    /// So many standard deviations of the healthy residual, and never below a thousandth of the
+    /// nominal value of the output.
+    Sigmas(f64),
+}
+
+/// What is known of the periodic disturbance.
+#[derive(Clone, Debug, PartialEq)]
+pub struct KnownDisturbance {
+    /// Period in seconds.
+    pub period: f64,
+    /// Harmonics, the fundamental included.
+    pub harmonics: usize,
+    /// Largest value of each channel (s), if known.
+    pub amplitude: Option<Vec<f64>>,
+}
+
+impl KnownDisturbance {
+    /// Angle per sample (radians) of each harmonic, for [`ControlSpec::resonators`].
+    pub fn angles(&self, sample_time: f64) -> Vec<f64> {
+        let fundamental = core::f64::consts::TAU * sample_time / self.period;
+        (1..=self.harmonics)
+            .map(|harmonic| harmonic as f64 * fundamental)
+            .collect()
+    }
+}
+
+/// The smallest threshold that is chosen automatically, relative to the nominal value.
+const SMALLEST_THRESHOLD: f64 = 1e-3;
+
+/// Leverage beyond which the residual is not trusted.
+const LEVERAGE_LIMIT: f64 = 100.0;
+
+/// A threshold opens by so much more than the largest known response to the disturbance before that
+/// is learned. While least squares learns, what is left of any such response stays below `1 / ROOM` of
+/// that opening (Cauchy-Schwarz), hence below the half from which the estimator learns.
+const ROOM: f64 = 2.5;
+
+/// Variance of a harmonic of which nothing is known, in units of the noise variance.
+const UNKNOWN_VARIANCE: f64 = 1e6;
+
+/// Share of what saturation took off that unwinds the integrator in one sample.
+const UNWINDING: f64 = 0.5;
+
+/// Largest fault of a sensor without a range, relative to the nominal value of its output.
+const LARGEST_FAULT: f64 = 1e6;
+
+/// Seed of the commissioning run; any will do, but the same design must give the same bytes.
+const COMMISSIONING_SEED: u64 = 20;
+
+/// Least ratio of the weakest to the strongest excited direction of a recorded database.
+const LEAST_EXCITATION: f64 = 1e-4;
+
+/// The most entries of the least-squares problem of one mode: beyond it memory runs short.
+const MOST_REGRESSORS: usize = 20_000_000;
+
+/// Samples a sliding window holds beyond those its own inputs can explain.
+const WINDOW_MARGIN: usize = 20;
+
+/// The most response coefficients per output: beyond it a predictor is too large to ship.
+const MOST_COEFFICIENTS: usize = 2000;
+
+/// Makes the design: synthesis of gains and observer, their certificate, the fault estimator.
+///
+/// # Errors
+/// [`DesignError::Request`] where the request is ill-formed, else what the synthesis says.
+pub fn assemble(request: Request) -> Result<Design, DesignError> {
+    let dims = Dimensions::check(&request.plant).map_err(DesignError::Request)?;
+    let asked = request.control.check(dims);
+    asked.map_err(DesignError::Request)?;
+    let estimator = estimator(&request, dims).map_err(DesignError::Request)?;
+    let scaling = scaling(&request.signals);
+    check_controllable(&request.plant, &request.control, &scaling).map_err(DesignError::Request)?;
+    let synthesis = synthesise(
+        &request.plant,
+        &request.control,
+        &request.observer,
+        &scaling,
+    )?;
+    let input_limits = limits(&request.signals.inputs);
+    let feedback = feedback(
+        &synthesis.state_feedback,
+        &request.plant,
+        request.bumpless,
+        request.feedforward,
+        &input_limits,
+    );
+    Ok(Design {
+        format: FORMAT,
+        name: request.name,
+        signals: request.signals,
+        controller: ControllerParameters {
+            plant: request.plant,
+            feedback,
+            observer: synthesis.observer.observer.clone(),
+            estimator,
+            compensation: request.compensation,
+            input_limits,
+        },
+        truth: request.truth,
+        scenario: request.scenario,
+        synthesis: Some(synthesis),
+    })
+}
+
+/// The nominal values of the signals.
+pub fn scaling(signals: &Signals) -> Scaling {
+    let nominal = |signals: &[Signal]| signals.iter().map(|s| s.nominal).collect();
+    Scaling {
+        states: nominal(&signals.states),
+        inputs: nominal(&signals.inputs),
+        outputs: nominal(&signals.outputs),
+    }
+}
+
+fn limits(inputs: &[Signal]) -> Vec<Limits> {
+    let of = |input: &Signal| Limits {
+        min: input.min,
+        max: input.max,
+    };
+    inputs.iter().map(of).collect()
+}
+
+/// The certified gains as the controller runs them, with or without reference feedforward. What saturation takes off an input unwinds
+/// the integral by half of what would undo it; inputs without a limit never saturate.
+pub fn feedback(
+    control: &super::StateFeedback,
+    plant: &SwitchedPlant,
+    bumpless: bool,
+    feedforward: bool,
+    limits: &[Limits],
+) -> StateFeedback {
+    let mut feedback = control.for_controller(plant);
+    feedback.bumpless = bumpless;
+    if feedforward {
+        let found = super::feedforward::feedforward(plant, control);
+        for (gains, gain) in feedback.modes.iter_mut().zip(found) {
+            gains.feedforward = gain;
+        }
+    }
+    for gains in &mut feedback.modes {
+        for (mut column, limit) in gains.anti_windup.column_iter_mut().zip(limits) {
+            let limited = limit.min.is_some() || limit.max.is_some();
+            column *= if limited { UNWINDING } else { 0.0 };
+        }
+    }
+    feedback
+}
+
+/// Predictors, thresholds and harmonics.
+fn estimator(request: &Request, dims: Dimensions) -> Result<Estimator, String> {
+    let spec = &request.estimator;
+    let outputs = &request.signals.outputs;
+    let response_length = match spec.method {
+        EstimatorMethod::None => 0,
+        EstimatorMethod::Reference | EstimatorMethod::Sliding => response_length(request, dims)?,
+    };
+    let predictors = match spec.method {
+        EstimatorMethod::Reference => predictors(request, response_length)?,
+        EstimatorMethod::None | EstimatorMethod::Sliding => Vec::new(),
+    };
+    let thresholds = thresholds(
+        &spec.threshold,
+        &predictors,
+        &request.scenario.noise,
+        outputs,
+    );
+    let harmonics = spec
+        .disturbance
+        .as_ref()
+        .map(|known| known_harmonics(known, &request.plant, &thresholds));
+    let harmonic_transfers = harmonics.as_ref().map_or_else(Vec::new, |known| {
+        harmonics::transfers(&request.plant, known.period, known.count)
+    });
+    Ok(Estimator {
+        method: spec.method,
+        response_length,
+        window: dims.inputs * (response_length + 1) + WINDOW_MARGIN,
+        predictors,
+        adapt: spec.adapt,
+        harmonics,
+        harmonic_transfers,
+        thresholds,
+        debounce: spec.debounce,
+        stuck_after: spec.stuck_after,
+        leverage_limit: LEVERAGE_LIMIT,
+        largest_fault: outputs.iter().map(largest_fault).collect(),
+    })
+}
+
+/// The response length asked for, or the one after which the response has decayed.
+fn response_length(request: &Request, dims: Dimensions) -> Result<usize, String> {
+    let decayed = commissioning::response_length(&request.plant.modes)?;
+    let length = request.estimator.response_length.unwrap_or(decayed);
+    let most = LONGEST_RESPONSE.min(MOST_COEFFICIENTS / dims.inputs);
+    if (1..=most).contains(&length) {
+        Ok(length)
+    } else {
+        Err(format!(
+            "the response length is {length} samples, but with {} inputs it must lie between 1 and {most}: \
+             set estimator.response_length, or choose a longer sample_time",
+            dims.inputs
+        ))
+    }
+}
+
+/// The predictor of each mode.
+fn predictors(request: &Request, length: usize) -> Result<Vec<Predictor>, String> {
+    let noise = &request.scenario.noise;
+    let predictor = |(index, mode): (usize, &Mode)| {
+        let amplitudes = amplitudes(mode, &request.signals.inputs);
+        match &request.estimator.database {
+            DatabaseSource::Model => Ok(commissioning::model_predictor(
+                mode,
+                length,
+                &amplitudes,
+                noise,
+            )),
+            DatabaseSource::Commission => {
+                let counted = commissioning::commissioning_samples(amplitudes.len(), length);
+                let seed = COMMISSIONING_SEED + index as u64;
+                let database =
+                    commissioning::commission(mode, &amplitudes, noise, length + counted, seed);
+                commissioning::predictor(&database, length, None)
+                    .map_err(|what| format!("mode {}: {what}", index + 1))
+            }
+            DatabaseSource::Recorded(logs) => {
+                let stretches = logs.get(index).map_or(&[][..], Vec::as_slice);
+                recorded(request, stretches, length)
+                    .map_err(|what| format!("mode {}: {what}", index + 1))
+            }
+        }
+    };
+    let modes = request.plant.modes.iter();
+    modes.enumerate().map(predictor).collect()
+}
+
+/// The predictor of a log of one mode, in which the disturbance was at work.
+fn recorded(request: &Request, stretches: &[Database], length: usize) -> Result<Predictor, String> {
+    let known = request.estimator.disturbance.as_ref();
+    let disturbance = known.map(|known| RecordedDisturbance {
+        period: known.period / request.plant.sample_time,
+        count: known.harmonics,
+    });
+    let inputs = &request.signals.inputs;
+    let samples: usize = stretches.iter().map(Database::samples).sum();
+    let most = MOST_REGRESSORS / (inputs.len() * length).max(1);
+    if samples > most {
+        return Err(format!(
+            "the log has {samples} samples, more than are needed: shorten it to at most {most}"
+        ));
+    }
+    let predictor = commissioning::predictor_of_stretches(stretches, length, disturbance)?;
+    let units: Vec<f64> = inputs.iter().map(|input| input.nominal).collect();
+    let (ratio, input, lag) = commissioning::weakest_direction(&predictor, &units);
+    if ratio < LEAST_EXCITATION {
+        return Err(format!(
+            "the log excites input {} ({}) {lag} samples back too little (1 : {:.0e} of the strongest direction): \
+             record a run in which every input moves on its own",
+            input + 1,
+            inputs[input].name,
+            1.0 / ratio.max(f64::MIN_POSITIVE)
+        ));
+    }
+    Ok(predictor)
+}
+
+/// How far each input may be moved about the operating point: its nominal value, or less where a
+/// limit is nearer. At a limit, half the range.
+fn amplitudes(mode: &Mode, inputs: &[Signal]) -> Vec<f64> {
+    let amplitude = |(input, &u0): (&Signal, &f64)| {
+        let above = input.max.map_or(f64::INFINITY, |max| max - u0);
+        let below = input.min.map_or(f64::INFINITY, |min| u0 - min);
+        let room = above.min(below);
+        let range = input.max.zip(input.min).map(|(max, min)| (max - min) / 2.0);
+        let admissible = if room > 0.0 {
+            room
+        } else {
+            range.unwrap_or(input.nominal)
+        };
+        input.nominal.min(admissible)
+    };
+    let point = &mode.operating_point.u;
+    inputs.iter().zip(point).map(amplitude).collect()
+}
+
+fn thresholds(
+    wanted: &Threshold,
+    predictors: &[Predictor],
+    noise: &[f64],
+    outputs: &[Signal],
+) -> Vec<f64> {
+    let deviation = |sensor: usize| {
+        let of = |predictor: &Predictor| predictor.deviation[sensor];
+        predictors.iter().map(of).fold(noise[sensor], f64::max)
+    };
+    match wanted {
+        Threshold::Given(values) => values.clone(),
+        Threshold::Sigmas(sigmas) => outputs
+            .iter()
+            .enumerate()
+            .map(|(sensor, output)| {
+                (sigmas * deviation(sensor)).max(SMALLEST_THRESHOLD * output.nominal)
+            })
+            .collect(),
+    }
+}
+
+/// What the estimator is told of the disturbance. A known amplitude bounds its response, so that
+/// the thresholds need not be opened wider than that response while it is being learned.
+fn known_harmonics(
+    known: &KnownDisturbance,
+    plant: &SwitchedPlant,
+    thresholds: &[f64],
+) -> Harmonics {
+    let period = known.period / plant.sample_time;
+    let variance = known.amplitude.as_ref().map(|amplitude| {
+        let response = harmonics::largest_response(plant, period, known.harmonics, amplitude);
+        let openings = response.iter().zip(thresholds).map(|(r, t)| r / t);
+        (ROOM * openings.fold(0.0, f64::max)).powi(2)
+    });
+    Harmonics {
+        period,
+        count: known.harmonics,
+        memory: (10.0 * period).max(200.0),
+        initial_variance: variance
+            .unwrap_or(UNKNOWN_VARIANCE)
+            .clamp(1.0, UNKNOWN_VARIANCE),
+    }
+}
+
+fn largest_fault(output: &Signal) -> f64 {
+    let range = output.max.zip(output.min).map(|(max, min)| max - min);
+    range.unwrap_or(LARGEST_FAULT * output.nominal)
+}

@@ -1,0 +1,157 @@
+//! The model a controller is designed on: plant, latency, integral action, performance signal.
+//!
+//! With `x~ = [x; u_prev; Z]` (`u_prev` only under latency 1) a mode reads
+//!
+//! ```text
+//! x~(k+1) = A x~(k) + B u(k) + E w(k) + R y_ref(k)                                 (2), (19), (24)
+//! Z(k+1)  = Z(k) + Te (y_ref(k) - S (C x(k) + F w(k)))
+//! v(k)    = H x~(k) + D u(k)                v = [W_y S C x; W_z Z; W_u u]
+//! ```
+//!
+//! With an internal model, `Z` holds after the `r` integrators, resonator by resonator and tracked
+//! output by tracked output, a pair that turns by the resonator's angle and is driven as the
+//! integrator is:
+//!
+//! ```text
+//! a(k+1) = cos a(k) - sin b(k) + Te (y_ref(k) - S (C x(k) + F w(k)))
+//! b(k+1) = sin a(k) + cos b(k)
+//! ```
+//!
+//! Sine and cosine are the very doubles the controller turns by. Both states of a pair have the unit
+//! and the weight of the integrator of their output: excited at its own frequency, a pair grows
+//! at `1 / sqrt(2)` of the rate at which the integrator grows under a constant.
+
+use super::{ControlSpec, Units};
+use ftc_plant::{Mode, SwitchedPlant};
+use nalgebra::DMatrix;
+
+/// One mode of the augmented model, in the units it was built with.
+#[derive(Clone, Debug, PartialEq)]
+pub struct AugmentedMode {
+    /// State matrix (d x d), `d = n + latency m + q` with `q = r (1 + 2 resonators)`.
+    pub a: DMatrix<f64>,
+    /// Input matrix (d x m).
+    pub b: DMatrix<f64>,
+    /// Disturbance matrix (d x s).
+    pub e: DMatrix<f64>,
+    /// Reference matrix (d x r); the reference is in physical units.
+    pub r: DMatrix<f64>,
+    /// State to performance signal ((r + q + m) x d).
+    pub h: DMatrix<f64>,
+    /// Input to performance signal ((r + q + m) x m).
+    pub d: DMatrix<f64>,
+}
+
+/// The augmented model of every mode. Each entry is one product of given numbers (and exact powers
+/// of two), so it carries at most one rounding.
+pub fn augment(plant: &SwitchedPlant, spec: &ControlSpec, units: &Units) -> Vec<AugmentedMode> {
+    let modes = plant.modes.iter();
+    modes
+        .map(|mode| augment_mode(mode, plant.sample_time, spec, units))
+        .collect()
+}
+
+fn augment_mode(mode: &Mode, sample_time: f64, spec: &ControlSpec, units: &Units) -> AugmentedMode {
+    let (n, m, s) = (mode.a.nrows(), mode.b.ncols(), mode.e.ncols());
+    let r = spec.tracked.len();
+    let previous = spec.latency * m;
+    let (first_z, q) = (n + previous, spec.integral_size());
+    let size = first_z + q;
+
+    let mut a = DMatrix::zeros(size, size);
+    let mut b = DMatrix::zeros(size, m);
+    let mut e = DMatrix::zeros(size, s);
+    let mut reference = DMatrix::zeros(size, r);
+    let mut h = DMatrix::zeros(r + q + m, size);
+    let mut d = DMatrix::zeros(r + q + m, m);
+
+    let input = scaled(&mode.b, &units.states, &units.inputs);
+    a.view_mut((0, 0), (n, n))
+        .copy_from(&scaled(&mode.a, &units.states, &units.states));
+    if spec.latency == 0 {
+        b.view_mut((0, 0), (n, m)).copy_from(&input);
+    } else {
+        a.view_mut((0, n), (n, m)).copy_from(&input);
+        b.view_mut((n, 0), (m, m)).fill_with_identity();
+    }
+    let all_disturbances = vec![units.disturbance; s];
+    e.view_mut((0, 0), (n, s))
+        .copy_from(&scaled(&mode.e, &units.states, &all_disturbances));
+
+    for (row, &output) in spec.tracked.iter().enumerate() {
+        for k in 0..n {
+            let c = mode.c[(output, k)] * units.states[k];
+            h[(row, k)] = spec.output_weight[row] * (c / units.performance);
+        }
+    }
+    for (index, of) in integral_states(spec).iter().enumerate() {
+        let z = first_z + index;
+        let output = spec.tracked[of.row];
+        let unit = units.integrators[of.row];
+        for (column, value) in of.turn {
+            a[(z, first_z + column)] = value;
+        }
+        if of.driven {
+            reference[(z, of.row)] = sample_time / unit;
+            for k in 0..n {
+                let c = mode.c[(output, k)] * units.states[k];
+                a[(z, k)] = -sample_time * (c / unit);
+            }
+            for k in 0..s {
+                e[(z, k)] = -sample_time * (mode.f[(output, k)] * units.disturbance / unit);
+            }
+        }
+        h[(r + index, z)] = spec.integral_weight[of.row] * (unit / units.performance);
+    }
+    for k in 0..m {
+        d[(r + q + k, k)] = spec.input_weight[k] * (units.inputs[k] / units.performance);
+    }
+    AugmentedMode {
+        a,
+        b,
+        e,
+        r: reference,
+        h,
+        d,
+    }
+}
+
+/// One state of the integral part.
+struct IntegralState {
+    /// Which of the tracked outputs it belongs to.
+    row: usize,
+    /// Its row of the autonomous dynamics: (index in the integral part, entry).
+    turn: [(usize, f64); 2],
+    /// Whether the tracking error enters it.
+    driven: bool,
+}
+
+/// The integral part, state by state, in the order of [`ftc_control::integrator`].
+fn integral_states(spec: &ControlSpec) -> Vec<IntegralState> {
+    let r = spec.tracked.len();
+    let integrator = |row| IntegralState {
+        row,
+        turn: [(row, 1.0); 2],
+        driven: true,
+    };
+    let mut states: Vec<_> = (0..r).map(integrator).collect();
+    for angle in &spec.resonators {
+        let (sine, cosine) = libm::sincos(*angle);
+        for row in 0..r {
+            let (first, second) = (states.len(), states.len() + 1);
+            let pair = [
+                ([(first, cosine), (second, -sine)], true),
+                ([(first, sine), (second, cosine)], false),
+            ];
+            states.extend(pair.map(|(turn, driven)| IntegralState { row, turn, driven }));
+        }
+    }
+    states
+}
+
+/// `rows^-1 matrix columns`; exact when the units are powers of two.
+pub(crate) fn scaled(matrix: &DMatrix<f64>, rows: &[f64], columns: &[f64]) -> DMatrix<f64> {
+    DMatrix::from_fn(matrix.nrows(), matrix.ncols(), |r, c| {
+        matrix[(r, c)] / rows[r] * columns[c]
+    })
+}

@@ -1,0 +1,421 @@
+//! The healthy database and the predictor made from it (41)-(43), (55)-(60).
+//!
+//! A database holds, for one mode, the inputs and outputs of a healthy plant under an exciting
+//! input. The predictor is the least-squares map from the last `j` inputs to the output,
+//! obtained by QR factorisation; `R` is kept, since it tells how far any later input lies from
+//! what the database has seen.
+
+use ftc_control::parameters::Predictor;
+use ftc_plant::noise;
+use ftc_plant::{Mode, spectral_radius};
+use nalgebra::{DMatrix, DVector};
+
+/// Healthy inputs and outputs of one mode, without a gap: row `k` holds `u(k)` (m) and `y(k)` (p).
+#[derive(Clone, Debug, PartialEq)]
+pub struct Database {
+    /// Number of the first sample in the log it was taken from; it only tells the phase of a
+    /// periodic disturbance between stretches of one log.
+    pub first: usize,
+    /// Inputs relative to the operating point (samples x m).
+    pub inputs: DMatrix<f64>,
+    /// Outputs relative to the operating point (samples x p).
+    pub outputs: DMatrix<f64>,
+}
+
+impl Database {
+    /// Number of samples.
+    pub fn samples(&self) -> usize {
+        self.inputs.nrows()
+    }
+}
+
+/// The truncation error allowed when a response length is chosen, relative to the response itself.
+const TRUNCATION: f64 = 1e-7;
+
+/// The longest response this estimator accepts.
+pub const LONGEST_RESPONSE: usize = 2000;
+
+/// The smallest `j` with `|C A^j| <= 1e-7 |C|` in every mode.
+///
+/// # Errors
+/// Names the mode that is unstable or decays too slowly.
+pub fn response_length(modes: &[Mode]) -> Result<usize, String> {
+    let mut longest = 1;
+    for (index, mode) in modes.iter().enumerate() {
+        let radius = spectral_radius(&mode.a);
+        if radius >= 1.0 {
+            return Err(format!(
+                "mode {}: A has spectral radius {radius:.4}, but the estimator needs a stable mode (below 1): \
+                 stabilise the plant first or set estimator.method = \"none\"",
+                index + 1
+            ));
+        }
+        let target = TRUNCATION * mode.c.norm();
+        let mut response = mode.c.clone();
+        let mut length = 0;
+        while response.norm() > target {
+            response = &response * &mode.a;
+            length += 1;
+            if length > LONGEST_RESPONSE {
+                return Err(format!(
+                    "mode {}: the response is still felt after {LONGEST_RESPONSE} samples (spectral radius {radius:.6}): \
+                     choose a longer sample_time for this loop",
+                    index + 1
+                ));
+            }
+        }
+        longest = longest.max(length);
+    }
+    Ok(longest)
+}
+
+/// Samples a commissioning run needs after the first `j`: four per unknown and a hundred more.
+pub fn commissioning_samples(inputs: usize, response_length: usize) -> usize {
+    4 * inputs * response_length + 100
+}
+
+/// Runs the healthy plant model in one mode under a random binary input of the given amplitudes (m),
+/// with measurement noise of the given standard deviations (p).
+pub fn commission(
+    mode: &Mode,
+    amplitudes: &[f64],
+    deviation: &[f64],
+    samples: usize,
+    seed: u64,
+) -> Database {
+    let (m, p) = (mode.b.ncols(), mode.c.nrows());
+    let mut x = DVector::zeros(mode.a.nrows());
+    let mut inputs = DMatrix::zeros(samples, m);
+    let mut outputs = DMatrix::zeros(samples, p);
+    let mut draws = vec![0.0; m + p];
+    for k in 0..samples {
+        noise::standard_normal(seed, k as u64, &mut draws);
+        let (signs, errors) = draws.split_at(m);
+        let u = DVector::from_fn(m, |i, _| amplitudes[i].copysign(signs[i]));
+        let y = &mode.c * &x + DVector::from_fn(p, |i, _| deviation[i] * errors[i]);
+        inputs.row_mut(k).tr_copy_from(&u);
+        outputs.row_mut(k).tr_copy_from(&y);
+        x = &mode.a * x + &mode.b * u;
+    }
+    Database {
+        first: 0,
+        inputs,
+        outputs,
+    }
+}
+
+/// A periodic disturbance present while a database was recorded.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct RecordedDisturbance {
+    /// Period in samples.
+    pub period: f64,
+    /// Number of harmonics.
+    pub count: usize,
+}
+
+/// The predictor of a database by least squares: [`predictor_of_stretches`] with a single one.
+///
+/// # Errors
+/// As [`predictor_of_stretches`].
+pub fn predictor(
+    database: &Database,
+    response_length: usize,
+    disturbance: Option<RecordedDisturbance>,
+) -> Result<Predictor, String> {
+    let stretches = std::slice::from_ref(database);
+    predictor_of_stretches(stretches, response_length, disturbance)
+}
+
+/// The predictor of one mode from every stretch of a log in which it was active, by least squares.
+/// The first `response_length` samples of a stretch only serve as past inputs: what came before
+/// them belongs to another mode.
+///
+/// A disturbance of known period is explained by sines and cosines of its own, which are then
+/// dropped: their phases belong to the recording. They stand first in the factorisation, so the
+/// trailing part of `R` belongs to what of the inputs they cannot explain.
+///
+/// A vanishing ridge keeps `R` regular when the database excites too little; such directions then
+/// have an enormous leverage and are never trusted.
+///
+/// # Errors
+/// The stretches have too few samples for `response_length`, or no input ever moves.
+pub fn predictor_of_stretches(
+    stretches: &[Database],
+    response_length: usize,
+    disturbance: Option<RecordedDisturbance>,
+) -> Result<Predictor, String> {
+    let (m, p) = stretches.first().map_or((0, 0), |stretch| {
+        (stretch.inputs.ncols(), stretch.outputs.ncols())
+    });
+    let waves = disturbance.map_or(0, |known| 2 * known.count);
+    let inputs = m * response_length;
+    let unknowns = waves + inputs;
+    let windows = windows(stretches, response_length);
+    let samples = windows.len();
+    if samples <= unknowns {
+        return Err(too_few(stretches, unknowns, response_length));
+    }
+    let wave = |k: usize, column: usize| {
+        let period = disturbance.map_or(1.0, |known| known.period);
+        let angle = core::f64::consts::TAU * (column / 2 + 1) as f64 * k as f64 / period;
+        if column.is_multiple_of(2) {
+            angle.sin()
+        } else {
+            angle.cos()
+        }
+    };
+    let regressors = DMatrix::from_fn(samples, unknowns, |row, column| {
+        let (stretch, k) = windows[row];
+        match column.checked_sub(waves) {
+            None => wave(stretch.first + k, column),
+            Some(past) => stretch.inputs[(k + past / m, past % m)],
+        }
+    });
+    let ridge = 1e-9 * regressors.columns(waves, inputs).norm() / (inputs as f64).sqrt();
+    if ridge == 0.0 {
+        return Err(
+            "the database excites nothing: every recorded input stays at its operating point"
+                .into(),
+        );
+    }
+    let mut stacked = regressors
+        .clone()
+        .resize_vertically(samples + unknowns, 0.0);
+    stacked
+        .view_mut((samples, 0), (unknowns, unknowns))
+        .fill_diagonal(ridge);
+    let targets = DMatrix::from_fn(samples, p, |row, output| {
+        let (stretch, k) = windows[row];
+        stretch.outputs[(k + response_length, output)]
+    });
+    let qr = stacked.qr();
+    let mut rotated = targets.clone().resize_vertically(samples + unknowns, 0.0);
+    qr.q_tr_mul(&mut rotated);
+    let factor = qr.r();
+    let solution = factor
+        .solve_upper_triangular(&rotated.rows(0, unknowns).into_owned())
+        .ok_or("the database cannot be factorised: its inputs are not finite")?;
+    let error = targets - regressors * &solution;
+    let freedom = (samples - unknowns) as f64;
+    let deviation = error
+        .column_iter()
+        .map(|column| (column.norm_squared() / freedom).sqrt())
+        .collect();
+    Ok(Predictor {
+        response: solution.rows(waves, inputs).transpose(),
+        factor: factor.view((waves, waves), (inputs, inputs)).into_owned(),
+        deviation,
+        samples,
+    })
+}
+
+/// Every stretch and sample at which a window of past inputs begins.
+fn windows(stretches: &[Database], response_length: usize) -> Vec<(&Database, usize)> {
+    let of = |stretch| {
+        let count = Database::samples(stretch).saturating_sub(response_length);
+        (0..count).map(move |k| (stretch, k))
+    };
+    stretches.iter().flat_map(of).collect()
+}
+
+fn too_few(stretches: &[Database], unknowns: usize, response_length: usize) -> String {
+    let total: usize = stretches.iter().map(Database::samples).sum();
+    let needed = unknowns + 1 + response_length * stretches.len().max(1);
+    let shape = match stretches.len() {
+        0 | 1 => format!("{total} samples"),
+        count => format!(
+            "{total} samples in {count} stretches, each of which spends its first {response_length} on the past,"
+        ),
+    };
+    format!(
+        "{shape} are too few to identify {unknowns} response coefficients: record at least {needed}"
+    )
+}
+
+/// How well each input was excited: the smallest singular value of `R` over the largest, and the
+/// input (0-based) and lag (samples, from 1) that weigh most in the direction excited least.
+/// Inputs are measured in `units` (m), so that a kilovolt and an ampere can be compared.
+pub fn weakest_direction(predictor: &Predictor, units: &[f64]) -> (f64, usize, usize) {
+    let inputs = units.len();
+    let mut factor = predictor.factor.clone();
+    for (column, mut entries) in factor.column_iter_mut().enumerate() {
+        entries /= units[column % inputs];
+    }
+    let svd = factor.svd(false, true);
+    let values = &svd.singular_values;
+    let ratio = values.min() / values.max().max(f64::MIN_POSITIVE);
+    let heaviest = svd
+        .v_t
+        .map_or(0, |v_t| v_t.row(values.imin()).transpose().iamax());
+    let lag = predictor.factor.nrows() / inputs - heaviest / inputs;
+    (ratio, heaviest % inputs, lag)
+}
+
+/// The predictor from the model's own Markov parameters `[C A^(j-1) B ... C B]` (48), with the
+/// leverage a database of `samples` under the given amplitudes (m) would have.
+pub fn model_predictor(
+    mode: &Mode,
+    response_length: usize,
+    amplitudes: &[f64],
+    deviation: &[f64],
+) -> Predictor {
+    let (m, p) = (mode.b.ncols(), mode.c.nrows());
+    let unknowns = m * response_length;
+    let samples = commissioning_samples(m, response_length);
+    let mut response = DMatrix::zeros(p, unknowns);
+    let mut markov = mode.b.clone();
+    for lag in 0..response_length {
+        let first = (response_length - 1 - lag) * m;
+        response
+            .columns_mut(first, m)
+            .copy_from(&(&mode.c * &markov));
+        markov = &mode.a * markov;
+    }
+    let spread = (samples as f64).sqrt();
+    let factor = DMatrix::from_diagonal(&DVector::from_fn(unknowns, |i, _| {
+        spread * amplitudes[i % m]
+    }));
+    Predictor {
+        response,
+        factor,
+        deviation: deviation.to_vec(),
+        samples,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use ftc_plant::OperatingPoint;
+    use proptest::prelude::*;
+
+    fn stable_mode(entries: &[f64]) -> Mode {
+        let (n, m, p) = (3, 2, 2);
+        let mut at = entries.iter().copied();
+        let mut matrix = |r, c| DMatrix::from_fn(r, c, |_, _| at.next().unwrap_or(0.5));
+        let a = matrix(n, n);
+        let radius = spectral_radius(&a).max(0.1);
+        Mode {
+            name: "random".into(),
+            a: a * (0.6 / radius),
+            b: matrix(n, m),
+            c: matrix(p, n),
+            e: DMatrix::zeros(n, 0),
+            f: DMatrix::zeros(p, 0),
+            operating_point: OperatingPoint::zero(n, m, p),
+        }
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig::with_cases(32))]
+        #[test]
+        fn a_noiseless_database_reconstructs_the_markov_parameters(entries in prop::collection::vec(-1.0..1.0f64, 21)) {
+            let mode = stable_mode(&entries);
+            let length = response_length(std::slice::from_ref(&mode)).unwrap();
+            let samples = length + commissioning_samples(2, length);
+            let found = predictor(&commission(&mode, &[1.0, 2.0], &[0.0, 0.0], samples, 3), length, None).unwrap();
+            let exact = model_predictor(&mode, length, &[1.0, 2.0], &[0.0, 0.0]);
+            let scale = exact.response.norm().max(1e-3);
+            prop_assert!((found.response - exact.response).norm() <= 1e-5 * scale);
+        }
+    }
+
+    #[test]
+    fn the_residual_deviation_is_that_of_the_noise() {
+        let mode = stable_mode(&[0.3; 21]);
+        let samples = 4000;
+        let found = predictor(
+            &commission(&mode, &[1.0, 1.0], &[0.05, 0.2], samples, 9),
+            10,
+            None,
+        )
+        .unwrap();
+        for (got, want) in found.deviation.iter().zip([0.05, 0.2]) {
+            assert!((got / want - 1.0).abs() < 0.1, "{got} for {want}");
+        }
+    }
+
+    #[test]
+    fn a_direction_never_excited_has_enormous_leverage() {
+        let mode = stable_mode(&[0.4; 21]);
+        let found = predictor(
+            &commission(&mode, &[1.0, 0.0], &[0.0, 0.0], 200, 1),
+            5,
+            None,
+        )
+        .unwrap();
+        let mut scratch = vec![0.0; 10];
+        let mut phi = vec![0.0; 10];
+        phi[0] = 1.0;
+        assert!(ftc_control::estimator::leverage(&found.factor, &phi, &mut scratch) < 1.0);
+        phi[1] = 1.0;
+        assert!(ftc_control::estimator::leverage(&found.factor, &phi, &mut scratch) > 1e6);
+    }
+
+    /// A sine on the outputs is explained away, not taken for the plant's response.
+    #[test]
+    fn a_recorded_disturbance_does_not_spoil_the_response() {
+        let mode = stable_mode(&[0.3; 21]);
+        let mut database = commission(&mode, &[1.0, 2.0], &[0.0, 0.0], 600, 3);
+        let period = 37.0;
+        for (k, mut row) in database.outputs.row_iter_mut().enumerate() {
+            row[0] += 0.7 * (core::f64::consts::TAU * k as f64 / period + 0.4).sin();
+        }
+        let length = response_length(std::slice::from_ref(&mode)).unwrap();
+        let exact = model_predictor(&mode, length, &[1.0, 2.0], &[0.0, 0.0]).response;
+        let known = RecordedDisturbance { period, count: 1 };
+        let error = |disturbance| {
+            (predictor(&database, length, disturbance).unwrap().response - &exact).norm()
+                / exact.norm()
+        };
+        assert!(error(Some(known)) < 1e-5, "{}", error(Some(known)));
+        assert!(error(None) > 1e-2);
+    }
+
+    /// Two stretches of a log with another mode between them identify what one long log does.
+    #[test]
+    fn stretches_are_joined_without_mixing_their_pasts() {
+        let mode = stable_mode(&[0.3; 21]);
+        let length = response_length(std::slice::from_ref(&mode)).unwrap();
+        let exact = model_predictor(&mode, length, &[1.0, 2.0], &[0.0, 0.0]).response;
+        let period = 37.0;
+        let stretches = [(0, 1), (777, 2)].map(|(first, seed)| {
+            let mut stretch = commission(&mode, &[1.0, 2.0], &[0.0, 0.0], 3 * length, seed);
+            for (k, mut row) in stretch.outputs.row_iter_mut().enumerate() {
+                row[1] += 0.3 * (core::f64::consts::TAU * (first + k) as f64 / period).sin();
+            }
+            Database { first, ..stretch }
+        });
+        let known = RecordedDisturbance { period, count: 1 };
+        assert!(predictor(&stretches[0], length, Some(known)).is_err());
+        let found = predictor_of_stretches(&stretches, length, Some(known)).unwrap();
+        assert_eq!(found.samples, 4 * length);
+        let error = (&found.response - &exact).norm() / exact.norm();
+        assert!(error < 1e-5, "{error}");
+        let mut shifted = stretches;
+        shifted[1].first += 10;
+        let mixed = predictor_of_stretches(&shifted, length, Some(known)).unwrap();
+        assert!((mixed.response - &exact).norm() / exact.norm() > 1e-3);
+    }
+
+    #[test]
+    fn the_weakest_direction_is_the_input_that_never_moved() {
+        let mode = stable_mode(&[0.4; 21]);
+        let found = predictor(
+            &commission(&mode, &[1.0, 0.0], &[0.0, 0.0], 200, 1),
+            5,
+            None,
+        )
+        .unwrap();
+        let (ratio, input, _) = weakest_direction(&found, &[1.0, 1.0]);
+        assert!(ratio < 1e-6 && input == 1);
+    }
+
+    #[test]
+    fn an_unstable_mode_is_refused_by_number() {
+        let mut mode = stable_mode(&[0.3; 21]);
+        mode.a *= 2.0;
+        let message = response_length(&[stable_mode(&[0.3; 21]), mode]).unwrap_err();
+        assert!(message.starts_with("mode 2:"), "{message}");
+    }
+}

@@ -1,0 +1,75 @@
+//! Whether the inputs reach what they are asked to govern, before any inequality is solved.
+
+use super::augmented::{AugmentedMode, augment};
+use super::{ControlSpec, Units};
+use ftc_plant::SwitchedPlant;
+use ftc_plant::scaling::Scaling;
+use nalgebra::{Complex, DMatrix};
+
+/// Singular values below this fraction of the largest count as zero.
+const RANK_TOLERANCE: f64 = 1e-11;
+
+/// Checks by the Popov-Belevitch-Hautus test that every eigenvalue of every mode, the integrators'
+/// and the resonators' included, that decays more slowly than asked can be moved by the inputs.
+///
+/// # Errors
+/// One sentence that names the mode and the eigenvalue.
+pub fn check_controllable(
+    plant: &SwitchedPlant,
+    spec: &ControlSpec,
+    scaling: &Scaling,
+) -> Result<(), String> {
+    let units = Units::choose(plant, spec, scaling);
+    let models = augment(plant, spec, &units);
+    for (index, (model, mode)) in models.iter().zip(&plant.modes).enumerate() {
+        let number = index + 1;
+        for eigenvalue in mode.a.complex_eigenvalues().iter() {
+            if eigenvalue.norm() >= spec.decay && !is_movable(model, *eigenvalue) {
+                return Err(format!(
+                    "mode {number}: (A, B) is uncontrollable: no input moves its eigenvalue {} of magnitude {:.4}, \
+                     which decays more slowly than controller.decay = {}: add an input or ask for a slower decay",
+                    shown(*eigenvalue),
+                    eigenvalue.norm(),
+                    spec.decay
+                ));
+            }
+        }
+        if !is_movable(model, Complex::new(1.0, 0.0)) {
+            return Err(format!(
+                "mode {number}: (A, B) cannot hold the tracked outputs at arbitrary values, the pair with integral action is \
+                 uncontrollable: track fewer outputs, or outputs on which the inputs act independently"
+            ));
+        }
+        for (harmonic, angle) in spec.resonators.iter().enumerate() {
+            if !is_movable(model, Complex::from_polar(1.0, *angle)) {
+                return Err(format!(
+                    "mode {number}: the inputs cannot move the tracked outputs at harmonic {} of the disturbance, so no internal \
+                     model can reject it: use fewer harmonics, track fewer outputs, or set internal_model = false",
+                    harmonic + 1
+                ));
+            }
+        }
+    }
+    Ok(())
+}
+
+/// Whether `[lambda I - A, B]` has full row rank.
+fn is_movable(model: &AugmentedMode, eigenvalue: Complex<f64>) -> bool {
+    let complex = |matrix: &DMatrix<f64>| matrix.map(|value| Complex::new(value, 0.0));
+    let states = model.a.nrows();
+    let shifted = DMatrix::from_diagonal_element(states, states, eigenvalue) - complex(&model.a);
+    let mut pencil = shifted.resize_horizontally(states + model.b.ncols(), Complex::new(0.0, 0.0));
+    pencil
+        .columns_mut(states, model.b.ncols())
+        .copy_from(&complex(&model.b));
+    let values = pencil.singular_values();
+    values.min() > RANK_TOLERANCE * values.max()
+}
+
+fn shown(value: Complex<f64>) -> String {
+    if value.im == 0.0 {
+        format!("{:.4}", value.re)
+    } else {
+        format!("{:.4}{:+.4}i", value.re, value.im)
+    }
+}

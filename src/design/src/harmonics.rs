@@ -1,0 +1,174 @@
+//! How a periodic disturbance that was heard in one mode sounds in another.
+//!
+//! At angle `theta` per sample the disturbance reaches the output through
+//! `G_i = C_i (e^{j theta} I - A_i)^-1 E_i + F_i`, so phasors learned in mode `i` become
+//! `G_j G_i^+` times themselves in mode `j`. That is exact where the model is, and a far better
+//! start than silence where it nearly is.
+
+use core::f64::consts::TAU;
+use ftc_control::parameters::PhasorMap;
+use ftc_plant::{Mode, SwitchedPlant};
+use nalgebra::{Complex, DMatrix, DVector};
+
+/// Singular values below this fraction of the largest count as zero.
+const TOLERANCE: f64 = 1e-9;
+
+/// Maps of all harmonics, `[from][to][harmonic]`, for a period in samples.
+///
+/// Empty where the plant knows no disturbance, since then nothing can be said.
+pub fn transfers(plant: &SwitchedPlant, period: f64, count: usize) -> Vec<Vec<Vec<PhasorMap>>> {
+    let responses: Option<Vec<Vec<_>>> = plant
+        .modes
+        .iter()
+        .map(|mode| {
+            (1..=count)
+                .map(|h| response(mode, TAU * h as f64 / period))
+                .collect()
+        })
+        .collect();
+    let silent =
+        |modes: &Vec<Vec<DMatrix<Complex<f64>>>>| modes.iter().flatten().all(|g| g.norm() == 0.0);
+    let Some(responses) = responses.filter(|modes| !silent(modes)) else {
+        return Vec::new();
+    };
+    let map = |from: &DMatrix<Complex<f64>>, to: &DMatrix<Complex<f64>>| {
+        let threshold = TOLERANCE * from.norm().max(f64::MIN_POSITIVE);
+        let inverse = from
+            .clone()
+            .pseudo_inverse(threshold)
+            .unwrap_or_else(|_| from.adjoint());
+        let product = to * inverse;
+        PhasorMap {
+            real: product.map(|z| z.re),
+            imaginary: product.map(|z| z.im),
+        }
+    };
+    responses
+        .iter()
+        .map(|from| {
+            responses
+                .iter()
+                .map(|to| from.iter().zip(to).map(|(f, t)| map(f, t)).collect())
+                .collect()
+        })
+        .collect()
+}
+
+/// A bound of each output (p) under a disturbance of the given amplitudes (s) at any of the first
+/// `count` harmonics of `period` (samples), in the worst mode: `max |G_i| a`.
+///
+/// Infinite where a mode resonates at a harmonic.
+pub fn largest_response(
+    plant: &SwitchedPlant,
+    period: f64,
+    count: usize,
+    amplitudes: &[f64],
+) -> Vec<f64> {
+    let amplitudes = DVector::from_column_slice(amplitudes);
+    let outputs = plant.dimensions().outputs;
+    let mut largest = DVector::zeros(outputs);
+    for mode in &plant.modes {
+        for harmonic in 1..=count {
+            let at_harmonic = match response(mode, TAU * harmonic as f64 / period) {
+                Some(gain) => gain.map(|z| z.norm()) * &amplitudes,
+                None => DVector::repeat(outputs, f64::INFINITY),
+            };
+            largest = largest.sup(&at_harmonic);
+        }
+    }
+    largest.iter().copied().collect()
+}
+
+/// `C (e^{j theta} I - A)^-1 E + F` (p x s); none on an eigenvalue of `A`.
+fn response(mode: &Mode, theta: f64) -> Option<DMatrix<Complex<f64>>> {
+    let complex = |matrix: &DMatrix<f64>| matrix.map(|v| Complex::new(v, 0.0));
+    let n = mode.a.nrows();
+    let turned = DMatrix::identity(n, n) * Complex::from_polar(1.0, theta) - complex(&mode.a);
+    let state = turned.lu().solve(&complex(&mode.e))?;
+    Some(complex(&mode.c) * state + complex(&mode.f))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use ftc_plant::OperatingPoint;
+
+    fn first_order(pole: f64, gain: f64) -> Mode {
+        let scalar = |v| DMatrix::from_element(1, 1, v);
+        Mode {
+            name: String::new(),
+            a: scalar(pole),
+            b: scalar(1.0),
+            c: scalar(1.0),
+            e: scalar(gain),
+            f: scalar(0.0),
+            operating_point: OperatingPoint::zero(1, 1, 1),
+        }
+    }
+
+    /// Simulated steady responses of two modes to the same sine are related by the map.
+    #[test]
+    fn maps_a_simulated_response_to_that_of_the_other_mode() {
+        let plant = SwitchedPlant {
+            sample_time: 1.0,
+            modes: vec![first_order(0.8, 1.0), first_order(-0.3, 2.0)],
+        };
+        let (period, ticks) = (20.0, 400);
+        let phasor = |mode: &Mode| {
+            let (mut x, mut sine, mut cosine) = (0.0, 0.0, 0.0);
+            for k in 0..ticks {
+                let angle = TAU * f64::from(k) / period;
+                if k >= ticks - 20 {
+                    sine += x * angle.sin() / 10.0;
+                    cosine += x * angle.cos() / 10.0;
+                }
+                x = mode.a[0] * x + mode.e[0] * angle.sin();
+            }
+            (sine, cosine)
+        };
+        let (a, b) = phasor(&plant.modes[0]);
+        let map = &transfers(&plant, period, 1)[0][1][0];
+        let (re, im) = (map.real[0], map.imaginary[0]);
+        let expected = phasor(&plant.modes[1]);
+        assert!(
+            (re * a - im * b - expected.0).abs() < 1e-9
+                && (im * a + re * b - expected.1).abs() < 1e-9
+        );
+    }
+
+    #[test]
+    fn a_plant_without_disturbance_has_no_maps() {
+        let plant = SwitchedPlant {
+            sample_time: 1.0,
+            modes: vec![first_order(0.8, 0.0)],
+        };
+        assert!(transfers(&plant, 20.0, 1).is_empty());
+    }
+
+    fn lag() -> SwitchedPlant {
+        SwitchedPlant {
+            sample_time: 1.0,
+            modes: vec![first_order(0.8, 1.0)],
+        }
+    }
+
+    #[test]
+    fn the_bound_is_what_a_long_simulation_settles_to() {
+        let period = 40.0;
+        let bound = largest_response(&lag(), period, 1, &[0.5])[0];
+        let (mut x, mut largest) = (0.0f64, 0.0f64);
+        for k in 0..4000 {
+            x = 0.8 * x + 0.5 * (TAU * f64::from(k) / period).sin();
+            largest = if k > 2000 { largest.max(x.abs()) } else { 0.0 };
+        }
+        assert!(largest <= bound * (1.0 + 1e-9));
+        // Forty samples a period see the crest to within 1 - cos(pi / 40).
+        assert!(largest >= bound * 0.99, "{largest} of {bound}");
+    }
+
+    #[test]
+    fn the_slowest_harmonic_counts_for_a_lag() {
+        let one = largest_response(&lag(), 40.0, 1, &[1.0]);
+        assert_eq!(one, largest_response(&lag(), 40.0, 5, &[1.0]));
+    }
+}

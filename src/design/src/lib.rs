@@ -1,0 +1,94 @@
+//! Off line: gains, observers, predictor and certificate.
+//!
+//! The data types and the certificate need no solver; making gains does (feature `design`).
+
+#[cfg(feature = "solver")]
+pub mod as_printed;
+#[cfg(feature = "solver")]
+pub mod assembly;
+pub mod augmented;
+pub mod certificate;
+pub mod commissioning;
+mod controllability;
+#[cfg(feature = "solver")]
+mod feedforward;
+pub mod harmonics;
+#[cfg(feature = "solver")]
+mod interior_point;
+#[cfg(feature = "solver")]
+pub mod lmi;
+mod lyapunov;
+pub mod observer;
+mod record;
+mod spec;
+pub mod state_feedback;
+mod units;
+mod verdict;
+
+use ftc_plant::SwitchedPlant;
+#[cfg(feature = "solver")]
+use ftc_plant::scaling::Scaling;
+use nalgebra::DMatrix;
+use serde::{Deserialize, Serialize};
+
+pub use certificate::{CertificateError, ControlCertificate};
+pub use controllability::check_controllable;
+pub use lyapunov::{DwellTime, Lyapunov};
+pub use observer::{ObserverCertificate, ObserverDesign};
+pub use record::{Design, FORMAT, Signal, Signals};
+pub use spec::{ControlSpec, Objective, ObserverChoice, ObserverSpec};
+pub use state_feedback::{ModeGains, StateFeedback};
+pub use units::Units;
+pub use verdict::{
+    Advice, BlockKind, BlockName, ConflictingBlock, DesignError, Infeasibility, SolverFailure,
+    Uncertified,
+};
+
+/// A certified state feedback and a certified observer for one plant.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Synthesis {
+    /// The gains of theorem T1 or T2.
+    pub state_feedback: StateFeedback,
+    /// The observer (11)-(17).
+    pub observer: ObserverDesign,
+}
+
+impl Synthesis {
+    /// Proves again everything it claims on this plant, without solving anything.
+    ///
+    /// # Errors
+    /// The first inequality that cannot be proved, or what does not fit.
+    pub fn verify(&self, plant: &SwitchedPlant) -> Result<(), CertificateError> {
+        self.state_feedback.verify(plant)?;
+        self.observer.verify(plant)
+    }
+}
+
+/// Designs and certifies state feedback and observer; `scaling` holds the nominal values of the
+/// signals (see [`Scaling::automatic`]).
+///
+/// # Errors
+/// As [`state_feedback::synthesise`] and [`observer::synthesise`].
+#[cfg(feature = "solver")]
+pub fn synthesise(
+    plant: &SwitchedPlant,
+    control: &ControlSpec,
+    observer: &ObserverSpec,
+    scaling: &Scaling,
+) -> Result<Synthesis, DesignError> {
+    Ok(Synthesis {
+        state_feedback: state_feedback::synthesise(plant, control, scaling)?,
+        observer: observer::synthesise(plant, observer, scaling)?,
+    })
+}
+
+/// The Moore-Penrose inverse; singular values below `tolerance` times the largest count as zero.
+pub(crate) fn pseudo_inverse(matrix: &DMatrix<f64>, tolerance: f64) -> DMatrix<f64> {
+    let zero = DMatrix::zeros(matrix.ncols(), matrix.nrows());
+    if matrix.is_empty() || matrix.amax() == 0.0 {
+        return zero;
+    }
+    let svd = matrix.clone().svd(true, true);
+    let threshold = tolerance * svd.singular_values.max();
+    svd.pseudo_inverse(threshold).unwrap_or(zero)
+}

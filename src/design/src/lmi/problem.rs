@@ -1,0 +1,212 @@
+//! Problems over linear matrix inequalities, and the margin problem that decides feasibility.
+
+use super::conic::{self, Conic};
+use super::expression::{Affine, Variable};
+use crate::verdict::{BlockName, SolverFailure};
+use nalgebra::DMatrix;
+
+/// A symmetric block matrix, affine in the unknowns, that must be positive (semi)definite.
+#[derive(Clone, Debug)]
+pub struct Inequality {
+    /// What it stands for.
+    pub name: BlockName,
+    /// Its blocks on and below the diagonal: row `i` holds blocks `0..=i`; `None` is zero.
+    rows: Vec<Vec<Option<Affine>>>,
+}
+
+impl Inequality {
+    /// Arranges blocks given row by row, up to and including the diagonal; the rest follows by
+    /// symmetry.
+    pub fn new(name: BlockName, rows: Vec<Vec<Option<Affine>>>) -> Self {
+        debug_assert!(rows.iter().enumerate().all(|(i, row)| row.len() == i + 1));
+        debug_assert!(
+            rows.iter()
+                .all(|row| row.last().is_some_and(Option::is_some))
+        );
+        Self { name, rows }
+    }
+
+    /// Number of rows of the whole matrix.
+    pub fn size(&self) -> usize {
+        self.offsets().last().copied().unwrap_or(0)
+    }
+
+    /// Where each block row starts, and the total at the end.
+    fn offsets(&self) -> Vec<usize> {
+        let mut offsets = vec![0];
+        for row in &self.rows {
+            let size = row
+                .last()
+                .and_then(Option::as_ref)
+                .map_or(0, |d| d.shape().0);
+            offsets.push(offsets[offsets.len() - 1] + size);
+        }
+        offsets
+    }
+
+    /// Calls `visit(block, row offset, column offset)` for each block that is not zero.
+    pub(super) fn for_each_block(&self, mut visit: impl FnMut(&Affine, usize, usize)) {
+        let offsets = self.offsets();
+        for (i, row) in self.rows.iter().enumerate() {
+            for (j, block) in row.iter().enumerate() {
+                if let Some(block) = block {
+                    debug_assert_eq!(
+                        block.shape(),
+                        (offsets[i + 1] - offsets[i], offsets[j + 1] - offsets[j])
+                    );
+                    visit(block, offsets[i], offsets[j]);
+                }
+            }
+        }
+    }
+}
+
+/// Unknowns, inequalities and linear equations between scalars.
+#[derive(Clone, Debug, Default)]
+pub struct Problem {
+    scalars: usize,
+    inequalities: Vec<Inequality>,
+    equations: Vec<Affine>,
+    bounds: Vec<Affine>,
+}
+
+/// What the solver came back with: to be judged, not trusted.
+#[derive(Clone, Debug)]
+pub struct Candidate {
+    /// The scalars of the problem, to be read through [`Variable::value`].
+    pub scalars: Vec<f64>,
+    /// The objective's value at these.
+    pub objective: f64,
+    /// The dual bound on the objective.
+    pub bound: f64,
+}
+
+/// The largest margin by which all inequalities hold at once.
+#[derive(Clone, Debug)]
+pub struct Margin {
+    /// `t*`: every inequality holds with `>= t* I`.
+    pub margin: f64,
+    /// The unknowns that reach it.
+    pub scalars: Vec<f64>,
+    /// Each inequality and its share (0 to 1) of the dual multiplier: who holds the margin down.
+    pub weights: Vec<(BlockName, f64)>,
+}
+
+impl Problem {
+    /// No unknowns yet.
+    pub fn new() -> Self {
+        Self::default()
+    }
+
+    fn register(&mut self, variable: Variable) -> Variable {
+        self.scalars += variable.count();
+        variable
+    }
+
+    /// A new symmetric unknown (size x size).
+    pub fn symmetric(&mut self, size: usize) -> Variable {
+        self.register(Variable::symmetric(self.scalars, size))
+    }
+
+    /// A new unknown matrix without structure.
+    pub fn full(&mut self, rows: usize, columns: usize) -> Variable {
+        self.register(Variable::full(self.scalars, rows, columns))
+    }
+
+    /// A new unknown number.
+    pub fn scalar(&mut self) -> Variable {
+        self.full(1, 1)
+    }
+
+    /// Demands that a block matrix be positive definite.
+    pub fn require(&mut self, inequality: Inequality) {
+        self.inequalities.push(inequality);
+    }
+
+    /// Demands that the sum of the diagonals of these square expressions equal `value`.
+    pub fn require_trace(&mut self, expressions: &[Affine], value: f64) {
+        self.equations.push(trace(expressions) - number(value));
+    }
+
+    /// Demands that the sum of the diagonals of these square expressions be at most `value`.
+    pub fn require_trace_below(&mut self, expressions: &[Affine], value: f64) {
+        self.bounds.push(number(value) - trace(expressions));
+    }
+
+    /// Demands that an unknown number be at least `value`.
+    pub fn require_at_least(&mut self, variable: &Variable, value: f64) {
+        self.bounds.push(variable.expression() - number(value));
+    }
+
+    /// Minimises a number (1 x 1).
+    ///
+    /// # Errors
+    /// When the solver returns nothing that could be a solution.
+    pub fn minimise(&self, objective: impl Into<Affine>) -> Result<Candidate, SolverFailure> {
+        let objective = objective.into();
+        let mut cost = vec![0.0; self.scalars];
+        objective.for_each_coefficient(|scalar, _, _, value| cost[scalar] += value);
+        let solved = self.conic(None).solve(&cost)?;
+        let constant = objective.constant(0, 0);
+        Ok(Candidate {
+            scalars: solved.primal,
+            objective: solved.objective + constant,
+            bound: solved.bound + constant,
+        })
+    }
+
+    /// Maximises `t` subject to every inequality `>= t I` and the equations. With the unknowns
+    /// normalised (see [`Problem::require_trace`]) this problem always has a strictly feasible point,
+    /// and a negative or vanishing optimum means that the inequalities conflict.
+    ///
+    /// # Errors
+    /// When the solver returns nothing that could be a solution.
+    pub fn margin(&self) -> Result<Margin, SolverFailure> {
+        let t = self.scalars;
+        let mut cost = vec![0.0; t + 1];
+        cost[t] = -1.0;
+        let mut solved = self.conic(Some(t)).solve(&cost)?;
+        solved.primal.truncate(t);
+        let total: f64 = solved.multipliers.iter().sum();
+        let names = self.inequalities.iter().map(|i| i.name.clone());
+        let shares = solved.multipliers.iter().map(|w| w / total);
+        Ok(Margin {
+            margin: -solved.objective,
+            scalars: solved.primal,
+            weights: names.zip(shares).collect(),
+        })
+    }
+
+    /// The problem in the solver's form; `margin` is the scalar `t` of `>= t I`.
+    fn conic(&self, margin: Option<usize>) -> Conic {
+        let mut conic = conic::Conic::new(self.scalars + usize::from(margin.is_some()));
+        for equation in &self.equations {
+            conic.zero(equation);
+        }
+        for bound in &self.bounds {
+            conic.nonnegative(bound);
+        }
+        for inequality in &self.inequalities {
+            conic.semidefinite(inequality, margin);
+        }
+        conic
+    }
+}
+
+/// A constant number as an expression.
+fn number(value: f64) -> Affine {
+    DMatrix::from_element(1, 1, value).into()
+}
+
+/// The sum of all diagonals, 1 x 1.
+pub fn trace(expressions: &[Affine]) -> Affine {
+    let mut sum = number(0.0);
+    for expression in expressions {
+        let size = expression.shape().0;
+        for i in 0..size {
+            let unit = DMatrix::from_fn(size, 1, |r, _| f64::from(u8::from(r == i)));
+            sum = sum + &unit.transpose() * expression.clone() * &unit;
+        }
+    }
+    sum
+}

@@ -1,0 +1,56 @@
+//! The state observer (11)-(17): unknown input observer, or Luenberger observer.
+//!
+//! With `H_ij = E_i (C_j E_i)^+` for a switch from mode `i` to mode `j` and `T_ij = I - H_ij C_j`,
+//! the estimation error obeys `e(k+1) = (T_ij A_i - K_i C_i) e(k)`: the state disturbance is gone.
+//! A Luenberger observer is the same with `H = 0`, `T = I`.
+
+#[cfg(feature = "solver")]
+mod existence;
+#[cfg(feature = "solver")]
+mod synthesis;
+
+#[cfg(feature = "solver")]
+pub use synthesis::synthesise;
+
+use super::certificate::{self, CertificateError, LyapunovMatrix};
+use super::{DwellTime, ObserverSpec};
+use ftc_control::parameters::Observer;
+use ftc_plant::SwitchedPlant;
+use serde::{Deserialize, Serialize};
+
+/// A certified observer.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct ObserverDesign {
+    /// What was asked for.
+    pub spec: ObserverSpec,
+    /// The observer itself, in physical units.
+    pub observer: Observer,
+    /// Spectral radius of each mode's error dynamics (floating point; the certificate proves the
+    /// decay).
+    pub spectral_radius: Vec<f64>,
+    /// How long modes must last, under [`Lyapunov::Dwell`](super::Lyapunov::Dwell).
+    pub dwell: Option<DwellTime>,
+    /// What proves it.
+    pub certificate: ObserverCertificate,
+}
+
+/// What, beside the plant and the gains, it takes to prove an observer.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct ObserverCertificate {
+    /// Units of the states (n), powers of two.
+    pub states: Vec<f64>,
+    /// Units of the outputs (p), powers of two.
+    pub outputs: Vec<f64>,
+    /// Matrices `P` of the functions `e' P e`: one for `common`, else one per mode.
+    pub lyapunov: Vec<LyapunovMatrix>,
+}
+
+impl ObserverDesign {
+    /// Proves, from these very doubles, the decay of the estimation error on this plant.
+    ///
+    /// # Errors
+    /// The first inequality that cannot be proved, or what does not fit.
+    pub fn verify(&self, plant: &SwitchedPlant) -> Result<(), CertificateError> {
+        certificate::verify_observer(plant, self)
+    }
+}

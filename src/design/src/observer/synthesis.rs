@@ -1,0 +1,328 @@
+//! The road from a plant to a certified observer.
+
+use super::existence::{PerUnit, check_detectable, decoupling};
+use super::{ObserverCertificate, ObserverDesign};
+use crate::augmented::scaled;
+use crate::certificate::{LyapunovMatrix, observer_growth};
+use crate::lmi::{Affine, Inequality, Problem, Variable};
+use crate::units::power_of_two;
+use crate::verdict::{BlockKind, BlockName, DesignError, SolverFailure, infeasible};
+use crate::{Advice, DwellTime, Lyapunov, ObserverChoice, ObserverSpec};
+use ftc_control::parameters::{Gain, Observer, ObserverKind};
+use ftc_plant::scaling::Scaling;
+use ftc_plant::{Dimensions, SwitchedPlant, spectral_radius};
+use nalgebra::DMatrix;
+
+/// A margin below this is no margin: the solver's own accuracy.
+const SMALLEST_MARGIN: f64 = 1e-9;
+
+/// Designs the observer that is asked for and proves it.
+///
+/// # Errors
+/// An ill-formed request, a condition of existence that fails (which, and for which mode), a
+/// conflict between inequalities (named, with advice that was tried), a failure of the solver, or
+/// a result that cannot be certified.
+pub fn synthesise(
+    plant: &SwitchedPlant,
+    spec: &ObserverSpec,
+    scaling: &Scaling,
+) -> Result<ObserverDesign, DesignError> {
+    Dimensions::check(plant).map_err(DesignError::Request)?;
+    spec.check().map_err(DesignError::Request)?;
+    match spec.kind {
+        ObserverChoice::Uio => unknown_input(plant, spec, scaling),
+        ObserverChoice::Luenberger => luenberger(plant, spec, scaling, None),
+        ObserverChoice::Auto => match reason_against(plant) {
+            Some(reason) => luenberger(plant, spec, scaling, Some(reason)),
+            None => unknown_input(plant, spec, scaling)
+                .or_else(|error| luenberger(plant, spec, scaling, Some(error.to_string()))),
+        },
+    }
+}
+
+/// Why decoupling would be pointless or harmful, from the channels of the disturbance alone.
+fn reason_against(plant: &SwitchedPlant) -> Option<String> {
+    let on_state = plant.modes.iter().any(|mode| mode.e.amax() > 0.0);
+    let on_output = plant.modes.iter().any(|mode| mode.f.amax() > 0.0);
+    match (on_state, on_output) {
+        (false, _) => Some("no disturbance acts on the state, so there is nothing to decouple".into()),
+        (true, true) => Some(
+            "the disturbance also acts on the outputs (F), and decoupling would pass it on to the estimate"
+                .into(),
+        ),
+        (true, false) => None,
+    }
+}
+
+fn unknown_input(
+    plant: &SwitchedPlant,
+    spec: &ObserverSpec,
+    scaling: &Scaling,
+) -> Result<ObserverDesign, DesignError> {
+    let units = units(scaling);
+    let h = decoupling(plant, &units.per_unit()).map_err(DesignError::Request)?;
+    if h.iter().flatten().all(|h| h.amax() == 0.0) {
+        return Err(DesignError::Request(
+            "an unknown input observer needs a disturbance on the state (E), but there is none: use luenberger or auto"
+                .into(),
+        ));
+    }
+    let mixed = plant.modes.iter().any(|mode| mode.f.amax() > 0.0);
+    let note = mixed.then(|| {
+        "the disturbance also acts on the outputs (F): that part reaches the estimate".to_owned()
+    });
+    design(plant, spec, &units, ObserverKind::Uio, note, h)
+}
+
+fn luenberger(
+    plant: &SwitchedPlant,
+    spec: &ObserverSpec,
+    scaling: &Scaling,
+    note: Option<String>,
+) -> Result<ObserverDesign, DesignError> {
+    let dims = plant.dimensions();
+    let zero = DMatrix::zeros(dims.states, dims.outputs);
+    let modes = plant.modes.len();
+    let h = vec![vec![zero; modes]; modes];
+    design(
+        plant,
+        spec,
+        &units(scaling),
+        ObserverKind::Luenberger,
+        note,
+        h,
+    )
+}
+
+/// Powers of two near the nominal values.
+struct OwnedUnits {
+    states: Vec<f64>,
+    outputs: Vec<f64>,
+}
+
+impl OwnedUnits {
+    fn per_unit(&self) -> PerUnit<'_> {
+        PerUnit {
+            states: &self.states,
+            outputs: &self.outputs,
+        }
+    }
+}
+
+fn units(scaling: &Scaling) -> OwnedUnits {
+    let round = |values: &[f64]| values.iter().map(|&v| power_of_two(v)).collect();
+    OwnedUnits {
+        states: round(&scaling.states),
+        outputs: round(&scaling.outputs),
+    }
+}
+
+/// The error dynamics in per-unit: `T_ij A_i` for every pair, `C_i` for every mode.
+struct ErrorModel {
+    projected: Vec<Vec<DMatrix<f64>>>,
+    outputs: Vec<DMatrix<f64>>,
+}
+
+impl ErrorModel {
+    fn new(plant: &SwitchedPlant, units: &PerUnit, h: &[Vec<DMatrix<f64>>]) -> Self {
+        let outputs: Vec<DMatrix<f64>> = plant.modes.iter().map(|mode| units.c(mode)).collect();
+        let projected = plant.modes.iter().zip(h).map(|(mode, row)| {
+            let a = units.a(mode);
+            let pairs = row.iter().zip(&outputs);
+            pairs.map(|(h, c)| &a - units.h(h) * (c * &a)).collect()
+        });
+        Self {
+            projected: projected.collect(),
+            outputs,
+        }
+    }
+
+    /// `(C_i, T_ij A_i)` must let the error decay as asked.
+    fn check_detectable(&self, spec: &ObserverSpec) -> Result<(), DesignError> {
+        for (i, j) in spec.lyapunov.observer_pairs(self.outputs.len()) {
+            let found = check_detectable(&self.projected[i][j], &self.outputs[i], spec.decay);
+            if let Err(magnitude) = found {
+                let reason = match magnitude < 1.0 {
+                    true => format!("ask for an observer decay above {magnitude:.4}"),
+                    false => "use a luenberger observer or more sensors".into(),
+                };
+                return Err(DesignError::Request(format!(
+                    "no observer of this kind reaches decay {} in mode {}: (C, T A) has an eigenvalue of magnitude \
+                     {magnitude:.4} that the outputs do not show; {reason}",
+                    spec.decay,
+                    i + 1
+                )));
+            }
+        }
+        Ok(())
+    }
+}
+
+/// The unknowns `P`, `N`, `W` of one mode.
+struct ModeUnknowns {
+    lyapunov: Variable,
+    slack: Variable,
+    injection: Variable,
+}
+
+/// `[beta^2 P_i (N_i T_ij A_i - W_i C_i)'; . N_i + N_i' - P_j]` for the pairs of a group of modes,
+/// normalised by the traces of `N`.
+fn error_decay(
+    model: &ErrorModel,
+    spec: &ObserverSpec,
+    group: &[usize],
+) -> (Problem, Vec<ModeUnknowns>) {
+    let (p, n) = model.outputs[0].shape();
+    let mut problem = Problem::new();
+    let mut unknowns: Vec<ModeUnknowns> = Vec::new();
+    for _ in group {
+        let own = match (spec.lyapunov, unknowns.first()) {
+            (Lyapunov::Common, Some(first)) => first.lyapunov,
+            _ => problem.symmetric(n),
+        };
+        let slack = match spec.lyapunov {
+            Lyapunov::Switched => problem.full(n, n),
+            Lyapunov::Common | Lyapunov::Dwell => own,
+        };
+        unknowns.push(ModeUnknowns {
+            lyapunov: own,
+            slack,
+            injection: problem.full(n, p),
+        });
+    }
+    for (a, b) in spec.lyapunov.observer_pairs(group.len()) {
+        let (i, j) = (group[a], group[b]);
+        let unknown = &unknowns[a];
+        let slack = unknown.slack.expression();
+        let next = unknowns[b].lyapunov.expression();
+        let diagonal = match spec.lyapunov {
+            Lyapunov::Switched => slack.clone() + slack.transpose() - next,
+            Lyapunov::Common | Lyapunov::Dwell => next,
+        };
+        let error =
+            slack * &model.projected[i][j] - unknown.injection.expression() * &model.outputs[i];
+        let own = spec.decay.powi(2) * unknown.lyapunov.expression();
+        problem.require(Inequality::new(
+            BlockName::new(BlockKind::ObserverDecay, i, j),
+            vec![vec![Some(own)], vec![Some(error), Some(diagonal)]],
+        ));
+    }
+    let distinct = spec.lyapunov.matrices(group.len());
+    let slacks: Vec<Affine> = unknowns[..distinct]
+        .iter()
+        .map(|unknown| unknown.slack.expression())
+        .collect();
+    problem.require_trace(&slacks, (distinct * n) as f64);
+    (problem, unknowns)
+}
+
+/// The observer with given `H`, or what would help.
+fn design(
+    plant: &SwitchedPlant,
+    spec: &ObserverSpec,
+    units: &OwnedUnits,
+    kind: ObserverKind,
+    note: Option<String>,
+    h: Vec<Vec<DMatrix<f64>>>,
+) -> Result<ObserverDesign, DesignError> {
+    let attempt = |spec: &ObserverSpec| attempt(plant, spec, units, kind, note.clone(), &h);
+    attempt(spec).map_err(|mut error| {
+        if let Some(found) = error.advice_mut() {
+            *found = advice(spec, &|candidate| attempt(candidate).is_ok());
+        }
+        error
+    })
+}
+
+/// The same without advice.
+fn attempt(
+    plant: &SwitchedPlant,
+    spec: &ObserverSpec,
+    units: &OwnedUnits,
+    kind: ObserverKind,
+    note: Option<String>,
+    h: &[Vec<DMatrix<f64>>],
+) -> Result<ObserverDesign, DesignError> {
+    let model = ErrorModel::new(plant, &units.per_unit(), h);
+    model.check_detectable(spec)?;
+    let mut gains = Vec::new();
+    let mut matrices = Vec::new();
+    for group in spec.lyapunov.groups(plant.modes.len()) {
+        let (problem, unknowns) = error_decay(&model, spec, &group);
+        let margin = problem.margin()?;
+        if margin.margin < SMALLEST_MARGIN {
+            return Err(infeasible(margin.margin, margin.weights));
+        }
+        for unknown in &unknowns {
+            let slack = unknown.slack.value(&margin.scalars);
+            let injection = unknown.injection.value(&margin.scalars);
+            let gain = slack.lu().solve(&injection);
+            gains.push(gain.ok_or(SolverFailure::NumericalTrouble)?);
+            matrices.push(unknown.lyapunov.value(&margin.scalars));
+        }
+    }
+    matrices.truncate(spec.lyapunov.matrices(gains.len()));
+    let errors = |i: usize| &model.projected[i][i] - &gains[i] * &model.outputs[i];
+    let physical = |gain: &DMatrix<f64>| {
+        let outward: Vec<f64> = units.states.iter().map(|unit| 1.0 / unit).collect();
+        let inward: Vec<f64> = units.outputs.iter().map(|unit| 1.0 / unit).collect();
+        scaled(gain, &outward, &inward)
+    };
+    let mut found = ObserverDesign {
+        spec: spec.clone(),
+        spectral_radius: (0..gains.len())
+            .map(|i| spectral_radius(&errors(i)))
+            .collect(),
+        observer: Observer {
+            kind,
+            note,
+            gains: gains.iter().map(|gain| Gain(physical(gain))).collect(),
+            decoupling: h
+                .iter()
+                .map(|row| row.iter().cloned().map(Gain).collect())
+                .collect(),
+        },
+        dwell: None,
+        certificate: ObserverCertificate {
+            states: units.states.clone(),
+            outputs: units.outputs.clone(),
+            lyapunov: matrices.into_iter().map(LyapunovMatrix).collect(),
+        },
+    };
+    if spec.lyapunov != Lyapunov::Dwell {
+        found.verify(plant)?;
+        return Ok(found);
+    }
+    let mu = observer_growth(plant, &found).ok_or(SolverFailure::NumericalTrouble)?;
+    let mut outcome = Err(SolverFailure::NumericalTrouble.into());
+    for allowance in DwellTime::ALLOWANCES {
+        let dwell = DwellTime::new(mu * (1.0 + allowance), spec.decay, plant.sample_time);
+        found.dwell = Some(dwell);
+        outcome = found.verify(plant).map_err(DesignError::from);
+        if outcome.is_ok() {
+            break;
+        }
+    }
+    outcome.map(|()| found)
+}
+
+/// The changes among the usual ones that work.
+fn advice(spec: &ObserverSpec, works: &dyn Fn(&ObserverSpec) -> bool) -> Vec<Advice> {
+    let slower = Advice::DECAYS.into_iter().find(|&decay| {
+        let candidate = ObserverSpec {
+            decay,
+            ..spec.clone()
+        };
+        decay > spec.decay && works(&candidate)
+    });
+    let other = spec.lyapunov.weaker().iter().find(|&&lyapunov| {
+        spec.decay < 1.0
+            && works(&ObserverSpec {
+                lyapunov,
+                ..spec.clone()
+            })
+    });
+    let mut advice: Vec<Advice> = slower.map(Advice::Decay).into_iter().collect();
+    advice.extend(other.map(|&lyapunov| Advice::Lyapunov(lyapunov)));
+    advice
+}

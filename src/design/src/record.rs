@@ -1,0 +1,153 @@
+//! The design as a record: plain data, everything the exporter ships and the FMUs read.
+
+use super::Synthesis;
+use ftc_control::ControllerParameters;
+use ftc_control::parameters::EstimatorMethod;
+use ftc_plant::Dimensions;
+use ftc_plant::{Scenario, Truth};
+use serde::{Deserialize, Serialize};
+
+/// Version of the record's layout; an FMU refuses a record of another.
+pub const FORMAT: u32 = 2;
+
+/// A finished design.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Design {
+    /// Layout version, [`FORMAT`].
+    pub format: u32,
+    /// Name of the design.
+    pub name: String,
+    /// What the signals are called and measured in.
+    pub signals: Signals,
+    /// The controller, with the plant it was designed for.
+    pub controller: ControllerParameters,
+    /// What the simulated plant really is.
+    #[serde(default)]
+    pub truth: Truth,
+    /// The experiment the plant FMU plays.
+    pub scenario: Scenario,
+    /// What proves the gains; none where they were not made by synthesis.
+    #[serde(default)]
+    pub synthesis: Option<Synthesis>,
+}
+
+/// Descriptions of the plant's signals.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Signals {
+    /// Inputs (m).
+    pub inputs: Vec<Signal>,
+    /// Outputs (p).
+    pub outputs: Vec<Signal>,
+    /// States (n).
+    pub states: Vec<Signal>,
+}
+
+/// One signal.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Signal {
+    /// Name, such as `u[1]` or the user's own.
+    pub name: String,
+    /// Unit, such as `V`; none means dimensionless.
+    pub unit: Option<String>,
+    /// A typical magnitude, positive.
+    pub nominal: f64,
+    /// Smallest value.
+    pub min: Option<f64>,
+    /// Largest value.
+    pub max: Option<f64>,
+}
+
+impl Design {
+    /// Whether every part fits the plant, so that nothing on line meets a wrong size.
+    ///
+    /// # Errors
+    /// One sentence that names the first part that does not fit.
+    pub fn check(&self) -> Result<(), String> {
+        if self.format != FORMAT {
+            return Err(format!(
+                "the design has layout {}, but this program reads layout {FORMAT}: export it again",
+                self.format
+            ));
+        }
+        let plant = &self.controller.plant;
+        let dims = Dimensions::check(plant)?;
+        let modes = plant.modes.len();
+        let scenario = &self.scenario;
+        let tracked = &self.controller.feedback.tracked;
+        let predicted = match self.controller.estimator.method {
+            EstimatorMethod::Reference => modes,
+            EstimatorMethod::Sliding | EstimatorMethod::None => {
+                self.controller.estimator.predictors.len()
+            }
+        };
+        for (what, found, needed) in [
+            ("inputs described", self.signals.inputs.len(), dims.inputs),
+            (
+                "outputs described",
+                self.signals.outputs.len(),
+                dims.outputs,
+            ),
+            ("states described", self.signals.states.len(), dims.states),
+            (
+                "modes with feedback gains",
+                self.controller.feedback.modes.len(),
+                modes,
+            ),
+            (
+                "modes with observer gains",
+                self.controller.observer.gains.len(),
+                modes,
+            ),
+            (
+                "modes with a predictor",
+                self.controller.estimator.predictors.len(),
+                predicted,
+            ),
+            (
+                "thresholds",
+                self.controller.estimator.thresholds.len(),
+                dims.outputs,
+            ),
+            (
+                "input limits",
+                self.controller.input_limits.len(),
+                dims.inputs,
+            ),
+            ("noise levels", scenario.noise.len(), dims.outputs),
+            ("references", scenario.reference.len(), tracked.len()),
+            ("faults", scenario.fault.len(), dims.outputs),
+            (
+                "disturbances",
+                scenario.disturbance.len(),
+                dims.disturbances,
+            ),
+        ] {
+            if found != needed {
+                return Err(format!(
+                    "the design has {found} {what}, but its plant needs {needed}"
+                ));
+            }
+        }
+        if tracked.iter().any(|&row| row >= dims.outputs) {
+            return Err(format!(
+                "the design tracks an output beyond its {}",
+                dims.outputs
+            ));
+        }
+        if scenario
+            .schedule
+            .iter()
+            .any(|interval| interval.mode >= modes)
+        {
+            return Err(format!(
+                "the schedule names a mode beyond the plant's {modes}"
+            ));
+        }
+        if let Truth::Linear { plant: truth } = &self.truth
+            && (Dimensions::check(truth)? != dims || truth.modes.len() != modes)
+        {
+            return Err("the true plant has other sizes than the designed one".into());
+        }
+        Ok(())
+    }
+}

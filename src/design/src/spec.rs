@@ -1,0 +1,195 @@
+//! What the user asks for.
+
+use super::Lyapunov;
+use core::f64::consts::{PI, TAU};
+use ftc_plant::Dimensions;
+use serde::{Deserialize, Serialize};
+
+/// The state feedback that is asked for.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct ControlSpec {
+    /// Indices (from 0) of the `r` outputs that follow a reference.
+    pub tracked: Vec<usize>,
+    /// Samples between a measurement and the first effect of its command: 0 or 1.
+    pub latency: usize,
+    /// Which guarantee of stability under switching.
+    pub lyapunov: Lyapunov,
+    /// Decay rate `alpha`: the state shrinks by this factor per sample, `0 < alpha <= 1`.
+    pub decay: f64,
+    /// What is optimised.
+    pub objective: Objective,
+    /// Angle per sample (radians, between 0 and pi) of each resonator of the internal model: the
+    /// tracking error vanishes at these frequencies too. None without an internal model.
+    #[serde(default)]
+    pub resonators: Vec<f64>,
+    /// `W_y`: weight of each tracked output (r), per physical unit.
+    pub output_weight: Vec<f64>,
+    /// `W_z`: weight of each integrator state (r), per physical unit times second; also that of both
+    /// states of each resonator of the same output.
+    pub integral_weight: Vec<f64>,
+    /// `W_u`: weight of each input (m), per physical unit.
+    pub input_weight: Vec<f64>,
+}
+
+/// What the gains are chosen for.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Objective {
+    /// The least l2 gain `gamma` from the disturbance to the performance signal (T2).
+    #[default]
+    Attenuation,
+    /// Stability with the decay rate only (T1, the sound form of Theorem 1).
+    Decay,
+}
+
+impl ControlSpec {
+    /// Every output tracked as far as there are inputs, decay 1, weights 1 / 1 / 1.
+    pub fn new(dims: Dimensions) -> Self {
+        let r = dims.outputs.min(dims.inputs);
+        Self {
+            tracked: (0..r).collect(),
+            latency: 0,
+            lyapunov: Lyapunov::Common,
+            decay: 1.0,
+            objective: Objective::Attenuation,
+            resonators: Vec::new(),
+            output_weight: vec![1.0; r],
+            integral_weight: vec![1.0; r],
+            input_weight: vec![1.0; dims.inputs],
+        }
+    }
+
+    /// Size `q` of the integral part: one integrator per tracked output, and two states per tracked
+    /// output and resonator.
+    pub fn integral_size(&self) -> usize {
+        self.tracked.len() * (1 + 2 * self.resonators.len())
+    }
+
+    /// Says in one sentence what is wrong with the request.
+    ///
+    /// # Errors
+    /// When a size, an index or a number is out of its range.
+    pub fn check(&self, dims: Dimensions) -> Result<(), String> {
+        let r = self.tracked.len();
+        if r == 0 {
+            return Err("tracked is empty: name at least one output".into());
+        }
+        if r > dims.inputs {
+            return Err(format!(
+                "{r} tracked outputs need at least {r} inputs, but the plant has {}: track fewer outputs",
+                dims.inputs
+            ));
+        }
+        for (at, output) in self.tracked.iter().enumerate() {
+            if *output >= dims.outputs {
+                return Err(format!(
+                    "tracked names output {}, but the plant has {}",
+                    output + 1,
+                    dims.outputs
+                ));
+            }
+            if self.tracked[..at].contains(output) {
+                return Err(format!("tracked names output {} twice", output + 1));
+            }
+        }
+        if self.latency > 1 {
+            return Err(format!("latency is {}: give 0 or 1 samples", self.latency));
+        }
+        check_decay("decay", self.decay, self.lyapunov)?;
+        check_resonators(&self.resonators)?;
+        for (name, weights, size) in [
+            ("output_weight", &self.output_weight, r),
+            ("integral_weight", &self.integral_weight, r),
+            ("input_weight", &self.input_weight, dims.inputs),
+        ] {
+            if weights.len() != size {
+                return Err(format!(
+                    "{name} has {} entries: give one number or {size}",
+                    weights.len()
+                ));
+            }
+            if weights.iter().any(|w| !w.is_finite() || *w < 0.0) {
+                return Err(format!("{name} must be finite and not negative"));
+            }
+        }
+        Ok(())
+    }
+}
+
+/// Angles between resonators, and between a resonator and the integrator (0) or the highest
+/// frequency there is (pi), below which no gains could tell them apart in double precision.
+const CLOSEST_ANGLES: f64 = 1e-3;
+
+/// Every resonator's angle lies between 0 and pi and keeps its distance from both and from the others.
+fn check_resonators(angles: &[f64]) -> Result<(), String> {
+    let room = CLOSEST_ANGLES..=PI - CLOSEST_ANGLES;
+    for (index, angle) in angles.iter().enumerate() {
+        let harmonic = index + 1;
+        if !room.contains(angle) {
+            let samples = TAU / angle;
+            return Err(format!(
+                "the internal model cannot hold harmonic {harmonic} of the disturbance, whose period is {samples:.6} samples: \
+                 choose a sample_time at which it lies between {:.4} and {:.0} samples, or use fewer harmonics or none \
+                 (internal_model = false)",
+                TAU / room.end(),
+                TAU / room.start()
+            ));
+        }
+        let near = |other: &f64| (other - angle).abs() < CLOSEST_ANGLES;
+        if angles[..index].iter().any(near) {
+            return Err(format!(
+                "resonator {harmonic} turns by {angle} radians per sample, as an earlier one does: name each frequency once"
+            ));
+        }
+    }
+    Ok(())
+}
+
+/// A decay rate lies in (0, 1]; strictly below 1 where a dwell time must come out of it.
+fn check_decay(name: &str, decay: f64, lyapunov: Lyapunov) -> Result<(), String> {
+    if !(decay > 0.0 && decay <= 1.0) {
+        return Err(format!(
+            "{name} is {decay}: give a number above 0 and at most 1"
+        ));
+    }
+    if lyapunov == Lyapunov::Dwell && decay == 1.0 {
+        return Err(format!(
+            "{name} = 1 gives no finite dwell time: give a number below 1"
+        ));
+    }
+    Ok(())
+}
+
+/// Which observer is wanted.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum ObserverChoice {
+    /// The unknown input observer where it exists and helps, else the Luenberger observer.
+    #[default]
+    Auto,
+    /// The unknown input observer (11)-(17): the state disturbance does not reach the estimate.
+    Uio,
+    /// No decoupling: `H = 0`, `T = I`.
+    Luenberger,
+}
+
+/// The observer that is asked for.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct ObserverSpec {
+    /// Which kind.
+    pub kind: ObserverChoice,
+    /// Decay rate `beta` of the estimation error, `0 < beta <= 1`.
+    pub decay: f64,
+    /// Which guarantee of stability under switching.
+    pub lyapunov: Lyapunov,
+}
+
+impl ObserverSpec {
+    /// Says in one sentence what is wrong with the request.
+    ///
+    /// # Errors
+    /// When the decay rate is out of its range.
+    pub fn check(&self) -> Result<(), String> {
+        check_decay("the observer's decay", self.decay, self.lyapunov)
+    }
+}

@@ -1,0 +1,114 @@
+//! State feedback with integral action: theorems T1 (stability) and T2 (attenuation).
+//!
+//! The command is `u = K x + K_u u_prev + G Z`, with one set of gains per mode.
+
+#[cfg(feature = "solver")]
+mod advice;
+#[cfg(feature = "solver")]
+mod frame;
+#[cfg(feature = "solver")]
+mod structured;
+#[cfg(feature = "solver")]
+mod synthesis;
+#[cfg(feature = "solver")]
+mod theorem;
+
+#[cfg(feature = "solver")]
+pub use synthesis::synthesise;
+
+use super::certificate::{self, CertificateError, ControlCertificate};
+use super::{ControlSpec, DwellTime, pseudo_inverse};
+use ftc_control::parameters::{self, FeedbackGains};
+use ftc_plant::SwitchedPlant;
+use ftc_plant::rows;
+use nalgebra::DMatrix;
+use serde::{Deserialize, Serialize};
+
+/// The gains of one mode, in physical units.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct ModeGains {
+    /// `K_i` (m x n), multiplies the deviation of the state from the operating point.
+    #[serde(with = "rows")]
+    pub state_feedback: DMatrix<f64>,
+    /// `G_i` (m x q), multiplies the integral part: the integrals of the tracking error, then the
+    /// resonators (`q = r` without an internal model).
+    #[serde(with = "rows")]
+    pub integral: DMatrix<f64>,
+    /// Multiplies the command that is acting now (m x m); no columns without latency.
+    #[serde(with = "rows")]
+    pub previous_input: DMatrix<f64>,
+}
+
+/// A certified state feedback.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct StateFeedback {
+    /// What was asked for.
+    pub spec: ControlSpec,
+    /// The gains of each mode.
+    pub modes: Vec<ModeGains>,
+    /// Proved bound of the l2 gain from the disturbance to the performance signal while the mode
+    /// is active (one number per mode, equal under `common` and `switched`); absent when only
+    /// decay was asked for or the plant knows no disturbance.
+    pub gamma: Option<Vec<f64>>,
+    /// Below this, per mode, no gains reach under the same guarantee, as far as the solver can tell
+    /// (its dual bound, not proved); zero where it cannot tell.
+    pub optimum: Option<Vec<f64>>,
+    /// Spectral radius of each mode's closed loop (floating point; the certificate proves the
+    /// decay).
+    pub spectral_radius: Vec<f64>,
+    /// How long modes must last, under [`Lyapunov::Dwell`](super::Lyapunov::Dwell).
+    pub dwell: Option<DwellTime>,
+    /// What proves it.
+    pub certificate: ControlCertificate,
+}
+
+/// A `gamma` below this, in the certificate's units (in which disturbance and performance signal are
+/// near one), counts as complete rejection: nothing smaller is sought.
+pub const REJECTION: f64 = 1e-4;
+
+/// How far above its optimum, relatively, a `gamma` may lie and be called the optimum.
+const OPTIMALITY: f64 = 1e-3;
+
+impl StateFeedback {
+    /// Whether `gamma` of a mode (from 0) is its optimum to one part in a thousand, or the disturbance
+    /// is rejected completely ([`REJECTION`]); `None` where no `gamma` was asked for.
+    pub fn is_optimal(&self, mode: usize) -> Option<bool> {
+        let (gamma, optimum) = (self.gamma.as_ref()?[mode], self.optimum.as_ref()?[mode]);
+        let units = &self.certificate.units;
+        let rejection = REJECTION * units.performance / units.disturbance;
+        Some(gamma <= (1.0 + OPTIMALITY) * optimum.max(rejection))
+    }
+
+    /// Proves, from these very doubles, decay, attenuation and dwell time on this plant.
+    ///
+    /// # Errors
+    /// The first inequality that cannot be proved, or what does not fit.
+    pub fn verify(&self, plant: &SwitchedPlant) -> Result<(), CertificateError> {
+        certificate::verify_state_feedback(plant, self)
+    }
+
+    /// What the on-line controller needs of it on this plant. Every inverse is taken here, so that
+    /// an FMU only multiplies and adds and gives the same bits on every machine. The anti-windup
+    /// gain is `G^+`: the integral is pulled back to where the clamped command would have come from.
+    pub fn for_controller(&self, plant: &SwitchedPlant) -> parameters::StateFeedback {
+        let modes = self.modes.iter().zip(&plant.modes).map(|(gains, mode)| {
+            let integral_inverse = pseudo_inverse(&gains.integral, 1e-12);
+            FeedbackGains {
+                state_feedback: gains.state_feedback.clone(),
+                integral: gains.integral.clone(),
+                feedforward: DMatrix::zeros(gains.integral.nrows(), 0),
+                previous_input: gains.previous_input.clone(),
+                anti_windup: integral_inverse.clone(),
+                integral_inverse,
+                output_feedback: &gains.state_feedback * pseudo_inverse(&mode.c, 1e-12),
+            }
+        });
+        parameters::StateFeedback {
+            tracked: self.spec.tracked.clone(),
+            latency: self.spec.latency,
+            resonators: self.spec.resonators.clone(),
+            bumpless: false,
+            modes: modes.collect(),
+        }
+    }
+}

@@ -1,0 +1,381 @@
+//! The road from the augmented model to certified gains.
+//!
+//! Scale; decide feasibility by the margin problem; minimise `g = gamma^2` in coordinates where the
+//! solver is at ease; give up a hair of the optimum for the largest margin, so that the result lies
+//! strictly inside; scale back; certify.
+
+use super::advice;
+use super::frame::{Frame, Part};
+use super::structured;
+use super::theorem;
+use super::{ModeGains, REJECTION, StateFeedback};
+use crate::augmented::{AugmentedMode, augment, scaled};
+use crate::certificate::{ControlCertificate, FactoredLyapunov, provable_dwell};
+use crate::lmi::Margin;
+use crate::verdict::{DesignError, SolverFailure, infeasible};
+use crate::{ControlSpec, Lyapunov, Objective, Units};
+use ftc_plant::scaling::Scaling;
+use ftc_plant::{Dimensions, SwitchedPlant, spectral_radius};
+use nalgebra::DMatrix;
+
+/// Relative sacrifices of `g = gamma^2` for a margin, tried in turn until the certificate holds.
+const SACRIFICES: [f64; 6] = [2e-5, 1e-4, 1e-3, 1e-2, 1e-1, 1.0];
+
+/// A margin below this is no margin: the solver's own accuracy.
+const SMALLEST_MARGIN: f64 = 1e-9;
+
+/// A margin beyond doubt.
+const SURE_MARGIN: f64 = 1e-6;
+
+/// A margin above this needs no better coordinates.
+const THICK_MARGIN: f64 = 1e-2;
+
+/// How often better coordinates are sought.
+const REFRAMINGS: usize = 12;
+
+/// A least level that better coordinates change by less than this, relatively, is the least.
+const AGREEMENT: f64 = 1e-5;
+
+/// Designs the state feedback that is asked for and proves it.
+///
+/// `scaling` holds the nominal values of the signals (see [`Scaling::automatic`]).
+///
+/// # Errors
+/// An ill-formed request, a conflict between inequalities (named, with advice that was tried), a
+/// failure of the solver, or a result that cannot be certified.
+pub fn synthesise(
+    plant: &SwitchedPlant,
+    spec: &ControlSpec,
+    scaling: &Scaling,
+) -> Result<StateFeedback, DesignError> {
+    attempt(plant, spec, scaling).map_err(|mut error| {
+        if let Some(advice) = error.advice_mut() {
+            *advice = advice::search(plant, spec, scaling);
+        }
+        error
+    })
+}
+
+/// The same without advice.
+fn attempt(
+    plant: &SwitchedPlant,
+    spec: &ControlSpec,
+    scaling: &Scaling,
+) -> Result<StateFeedback, DesignError> {
+    let dims = Dimensions::check(plant).map_err(DesignError::Request)?;
+    spec.check(dims).map_err(DesignError::Request)?;
+    let units = Units::choose(plant, spec, scaling);
+    let road = Road {
+        plant,
+        spec,
+        models: augment(plant, spec, &units),
+        units,
+    };
+    let disturbed = road.models.iter().any(|model| model.e.amax() > 0.0);
+    let optimised = spec.objective == Objective::Attenuation && disturbed;
+    if optimised && let Some(design) = road.direct() {
+        return Ok(design);
+    }
+    let mut stable = Vec::new();
+    for group in road.groups() {
+        match road.stabilised(&group)? {
+            Verdict::Stable(parts) => stable.push(parts),
+            Verdict::Conflict(margin) => {
+                return Err(infeasible(margin.margin, margin.weights));
+            }
+        }
+    }
+    match optimised {
+        true => road.attenuate(&stable),
+        false => road.certified(stable.concat(), None),
+    }
+}
+
+/// Whether a request leads all the way to certified gains. The cheap question comes first: whether
+/// decay and guarantee can be had at all.
+pub(super) fn succeeds(plant: &SwitchedPlant, spec: &ControlSpec, scaling: &Scaling) -> bool {
+    let units = Units::choose(plant, spec, scaling);
+    let models = augment(plant, spec, &units);
+    let stabilised = spec.lyapunov.groups(models.len()).iter().all(|group| {
+        let found = stable(&models, spec, group);
+        found.is_ok_and(|(margin, parts)| parts.is_some() && margin.margin >= SURE_MARGIN)
+    });
+    stabilised && attempt(plant, spec, scaling).is_ok()
+}
+
+/// Stabilising gains of a group with their margin, sought in the design's coordinates and, where
+/// these show hardly any, in those of a regulator; no gains where neither does.
+fn stable(
+    models: &[AugmentedMode],
+    spec: &ControlSpec,
+    group: &[usize],
+) -> Result<(Margin, Option<Vec<Part>>), SolverFailure> {
+    let plain = match theorem::stabilise(models, spec, group) {
+        Ok((margin, parts)) if margin.margin >= SURE_MARGIN => return Ok((margin, Some(parts))),
+        uncertain => uncertain,
+    };
+    let regulated = Frame::of_regulated(models, group, spec.decay).and_then(|frame| {
+        let (margin, parts) = theorem::stabilise(&frame.view(models), spec, group).ok()?;
+        (margin.margin >= SURE_MARGIN).then(|| (margin, frame.restore(parts)))
+    });
+    if let Some((margin, parts)) = regulated {
+        return Ok((margin, Some(parts)));
+    }
+    let (margin, parts) = plain?;
+    let shown = margin.margin >= SMALLEST_MARGIN;
+    Ok((margin, shown.then_some(parts)))
+}
+
+/// The gains solved for again in the coordinates they suggest, as long as the margin is thin and
+/// doubles.
+fn thickened(
+    models: &[AugmentedMode],
+    spec: &ControlSpec,
+    group: &[usize],
+    mut margin: Margin,
+    mut parts: Vec<Part>,
+) -> (Margin, Vec<Part>) {
+    for _ in 0..REFRAMINGS {
+        let frame = Frame::of_stabilised(models, &parts);
+        let Some(frame) = frame.filter(|_| margin.margin < THICK_MARGIN) else {
+            break;
+        };
+        match theorem::stabilise(&frame.view(models), spec, group) {
+            Ok((better, found)) if better.margin > 2.0 * margin.margin => {
+                (margin, parts) = (better, frame.restore(found));
+            }
+            _ => break,
+        }
+    }
+    (margin, parts)
+}
+
+/// Whether a group of modes can be stabilised as asked.
+enum Verdict {
+    Stable(Vec<Part>),
+    Conflict(Margin),
+}
+
+/// The least level of a group.
+struct Optimum {
+    /// `g = gamma^2` in the design's units.
+    level: f64,
+    /// No `g` is below this, as the solver sees it; zero where it does not tell.
+    bound: f64,
+    /// Coordinates in which the solution is near the identity.
+    frame: Frame,
+}
+
+/// What every stage works on.
+struct Road<'a> {
+    plant: &'a SwitchedPlant,
+    spec: &'a ControlSpec,
+    units: Units,
+    models: Vec<AugmentedMode>,
+}
+
+impl Road<'_> {
+    /// Modes that share a problem.
+    fn groups(&self) -> Vec<Vec<usize>> {
+        self.spec.lyapunov.groups(self.models.len())
+    }
+
+    /// The design by the interior-point method that uses the structure, from the coordinates of
+    /// regulators; `None` where any part of it falls short.
+    fn direct(&self) -> Option<StateFeedback> {
+        let groups = self.groups();
+        let least = groups.iter().map(|group| self.direct_level(group));
+        let least = least.collect::<Option<Vec<_>>>()?;
+        SACRIFICES.iter().find_map(|&sacrifice| {
+            let mut levels = Levels::new(self);
+            let mut parts = Vec::new();
+            for (group, least) in groups.iter().zip(&least) {
+                let (frame, level) = (&least.frame, levels.set(group, least, sacrifice));
+                let view = frame.view(&self.models);
+                let level = frame.view_level(level);
+                let found = structured::centred(&view, self.spec, group, level).ok()?;
+                parts.extend(frame.restore(found));
+            }
+            self.certified(parts, Some(levels)).ok()
+        })
+    }
+
+    /// The least level of a group by the interior-point method that uses the structure.
+    fn direct_level(&self, group: &[usize]) -> Option<Optimum> {
+        let models = &self.models;
+        let regulated = Frame::of_regulated(models, group, self.spec.decay)?;
+        let regulated = regulated.with_signals(models, group);
+        let floor = regulated.view_level(REJECTION.powi(2));
+        let view = regulated.view(models);
+        let found = structured::least_level(&view, self.spec, group, floor).ok()?;
+        let level = regulated.restore_level(found.level);
+        let frame = Frame::of_attenuated(models, &regulated.restore(found.parts), level)?;
+        Some(Optimum {
+            level,
+            bound: regulated.restore_level(found.bound),
+            frame,
+        })
+    }
+
+    /// Stabilising gains of a group (T1).
+    fn stabilised(&self, group: &[usize]) -> Result<Verdict, SolverFailure> {
+        Ok(match stable(&self.models, self.spec, group)? {
+            (margin, Some(parts)) => {
+                Verdict::Stable(thickened(&self.models, self.spec, group, margin, parts).1)
+            }
+            (margin, None) => Verdict::Conflict(margin),
+        })
+    }
+
+    /// The least `g` of a group, and coordinates in which (T2) is at ease near it: each solution's
+    /// coordinates serve the next, which looks at Lyapunov matrices further away, until both agree.
+    fn least_level(&self, group: &[usize], start: &[Part]) -> Result<Optimum, SolverFailure> {
+        let models = &self.models;
+        let (size, inputs) = models[0].b.shape();
+        let mut frame =
+            Frame::of_stabilised(models, start).unwrap_or_else(|| Frame::identity(size, inputs));
+        let (mut least, mut bound): (Option<f64>, f64) = (None, 0.0);
+        for _ in 0..REFRAMINGS {
+            let floor = frame.view_level(REJECTION.powi(2));
+            let view = frame.view(models);
+            let Ok(found) = theorem::least_level(&view, self.spec, group, floor) else {
+                break;
+            };
+            let level = frame.restore_level(found.level.max(floor));
+            if least.is_some_and(|least| (level / least - 1.0).abs() < AGREEMENT) {
+                (least, bound) = (Some(level), frame.restore_level(found.bound.max(0.0)));
+                break;
+            }
+            let parts = frame.restore(found.parts);
+            let Some(better) = Frame::of_attenuated(models, &parts, level) else {
+                break;
+            };
+            (least, frame) = (Some(level), better);
+        }
+        let level = least.ok_or(SolverFailure::NumericalTrouble)?;
+        Ok(Optimum {
+            level,
+            bound,
+            frame,
+        })
+    }
+
+    /// Theorem T2: the least `gamma`, the gains that reach it but for a hair, and their proof.
+    fn attenuate(&self, stable: &[Vec<Part>]) -> Result<StateFeedback, DesignError> {
+        let groups = self.groups();
+        let mut least = Vec::new();
+        for (group, start) in groups.iter().zip(stable) {
+            least.push(self.least_level(group, start)?);
+        }
+        let mut outcome = Err(DesignError::Solver(SolverFailure::NumericalTrouble));
+        for sacrifice in SACRIFICES {
+            outcome = self.centred(&groups, &least, sacrifice);
+            if outcome.is_ok() {
+                break;
+            }
+        }
+        outcome
+    }
+
+    /// Gains of largest margin at the least levels but for a `sacrifice`, certified.
+    fn centred(
+        &self,
+        groups: &[Vec<usize>],
+        least: &[Optimum],
+        sacrifice: f64,
+    ) -> Result<StateFeedback, DesignError> {
+        let mut levels = Levels::new(self);
+        let mut parts = Vec::new();
+        for (group, least) in groups.iter().zip(least) {
+            let (frame, level) = (&least.frame, levels.set(group, least, sacrifice));
+            let view = frame.view(&self.models);
+            let found = theorem::centred(&view, self.spec, group, frame.view_level(level))?;
+            parts.extend(frame.restore(found));
+        }
+        self.certified(parts, Some(levels))
+    }
+
+    /// Puts the parts together in physical units, and proves the whole.
+    fn certified(
+        &self,
+        parts: Vec<Part>,
+        levels: Option<Levels>,
+    ) -> Result<StateFeedback, DesignError> {
+        let (spec, plant) = (self.spec, self.plant);
+        let distinct = &parts[..spec.lyapunov.matrices(parts.len())];
+        let matrices: Vec<FactoredLyapunov> =
+            distinct.iter().map(|part| part.lyapunov.clone()).collect();
+        let dwell = match spec.lyapunov {
+            Lyapunov::Dwell => Some(provable_dwell(&matrices, spec.decay, plant.sample_time)?),
+            Lyapunov::Common | Lyapunov::Switched => None,
+        };
+        let closed = self.models.iter().zip(&parts);
+        let (gamma, optimum) = levels.map(|l| (l.gamma, l.optimum)).unzip();
+        let design = StateFeedback {
+            spec: spec.clone(),
+            spectral_radius: closed
+                .map(|(model, part)| spectral_radius(&(&model.a + &model.b * &part.gain)))
+                .collect(),
+            modes: parts
+                .iter()
+                .map(|part| physical_gains(&part.gain, &self.units, spec))
+                .collect(),
+            gamma,
+            optimum,
+            dwell,
+            certificate: ControlCertificate {
+                units: self.units.clone(),
+                lyapunov: matrices,
+            },
+        };
+        design.verify(plant)?;
+        Ok(design)
+    }
+}
+
+/// `gamma` per mode, in the user's units.
+struct Levels {
+    gamma: Vec<f64>,
+    optimum: Vec<f64>,
+    /// What one unit of `gamma` in the design's units is to the user.
+    physical: f64,
+}
+
+impl Levels {
+    fn new(road: &Road) -> Self {
+        let modes = road.models.len();
+        Self {
+            gamma: vec![0.0; modes],
+            optimum: vec![0.0; modes],
+            physical: road.units.performance / road.units.disturbance,
+        }
+    }
+
+    /// Notes the least level `g` of a group, gives up `sacrifice` of it, and returns the `g` that is
+    /// left to prove.
+    fn set(&mut self, group: &[usize], least: &Optimum, sacrifice: f64) -> f64 {
+        let relaxed = least.level * (1.0 + sacrifice);
+        for &mode in group {
+            self.optimum[mode] = least.bound.sqrt() * self.physical;
+            self.gamma[mode] = relaxed.sqrt() * self.physical;
+        }
+        relaxed
+    }
+}
+
+/// Splits `K~ = [K, K_u, G]` and undoes the scaling; exact, since the units are powers of two.
+fn physical_gains(gain: &DMatrix<f64>, units: &Units, spec: &ControlSpec) -> ModeGains {
+    let (n, m) = (units.states.len(), units.inputs.len());
+    let previous = spec.latency * m;
+    let inverse = |values: &[f64]| values.iter().map(|v| 1.0 / v).collect::<Vec<_>>();
+    let outward = inverse(&units.inputs);
+    let part = |first: usize, units: &[f64]| {
+        let block = gain.columns(first, units.len()).into_owned();
+        scaled(&block, &outward, &inverse(units))
+    };
+    ModeGains {
+        state_feedback: part(0, &units.states),
+        previous_input: part(n, &units.inputs[..previous]),
+        integral: part(n + previous, &units.integral_part(spec)),
+    }
+}

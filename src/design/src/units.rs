@@ -1,0 +1,98 @@
+//! The units a design is solved and certified in.
+//!
+//! Every unit is a power of two, so that going there and back changes no digit: a certificate of
+//! the scaled design is a certificate of the shipped doubles.
+
+use super::ControlSpec;
+use ftc_plant::SwitchedPlant;
+use ftc_plant::scaling::Scaling;
+use serde::{Deserialize, Serialize};
+
+/// Powers of two by which signals are divided.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Units {
+    /// States (n).
+    pub states: Vec<f64>,
+    /// Inputs (m).
+    pub inputs: Vec<f64>,
+    /// Outputs (p).
+    pub outputs: Vec<f64>,
+    /// Integrator states (r): near `Te` times the unit of the tracked output; also the unit of the
+    /// resonators of that output.
+    pub integrators: Vec<f64>,
+    /// Disturbances, one unit for all.
+    pub disturbance: f64,
+    /// Performance signal, one unit for all.
+    pub performance: f64,
+}
+
+impl Units {
+    /// One for every signal.
+    pub fn unit(plant: &SwitchedPlant, tracked: usize) -> Self {
+        let dims = plant.dimensions();
+        Self {
+            states: vec![1.0; dims.states],
+            inputs: vec![1.0; dims.inputs],
+            outputs: vec![1.0; dims.outputs],
+            integrators: vec![1.0; tracked],
+            disturbance: 1.0,
+            performance: 1.0,
+        }
+    }
+
+    /// The powers of two nearest the nominal values, with the integrator, the disturbance and the
+    /// performance signal brought near one as well.
+    pub fn choose(plant: &SwitchedPlant, spec: &ControlSpec, scaling: &Scaling) -> Self {
+        let round = |values: &[f64]| values.iter().map(|&v| power_of_two(v)).collect::<Vec<_>>();
+        let outputs = round(&scaling.outputs);
+        let step = power_of_two(plant.sample_time);
+        let mut units = Self {
+            integrators: spec.tracked.iter().map(|&o| step * outputs[o]).collect(),
+            states: round(&scaling.states),
+            inputs: round(&scaling.inputs),
+            outputs,
+            disturbance: 1.0,
+            performance: 1.0,
+        };
+        let models = super::augmented::augment(plant, spec, &units);
+        let largest = |values: &mut dyn Iterator<Item = f64>| values.fold(0.0, f64::max);
+        let disturbance = largest(&mut models.iter().map(|model| model.e.amax()));
+        let performance = largest(&mut models.iter().map(|m| m.h.amax().max(m.d.amax())));
+        units.disturbance = 1.0 / power_of_two(disturbance);
+        units.performance = power_of_two(performance);
+        units
+    }
+
+    /// The unit of each state of the integral part (q entries), in the order of the augmented model.
+    pub fn integral_part(&self, spec: &ControlSpec) -> Vec<f64> {
+        let pairs = self.integrators.iter().flat_map(|&unit| [unit; 2]);
+        let resonators = spec.resonators.iter().flat_map(|_| pairs.clone());
+        self.integrators.iter().copied().chain(resonators).collect()
+    }
+
+    /// Whether there is one positive power of two per signal, as exact scaling needs.
+    pub fn fit(&self, plant: &SwitchedPlant, tracked: usize) -> bool {
+        let dims = plant.dimensions();
+        let sizes = [
+            (&self.states, dims.states),
+            (&self.inputs, dims.inputs),
+            (&self.outputs, dims.outputs),
+            (&self.integrators, tracked),
+        ];
+        let mut all = sizes.iter().flat_map(|(units, _)| units.iter());
+        sizes.iter().all(|(units, size)| units.len() == *size)
+            && all.all(|&unit| power_of_two(unit) == unit)
+            && power_of_two(self.disturbance) == self.disturbance
+            && power_of_two(self.performance) == self.performance
+    }
+}
+
+/// The power of two nearest a positive number on the logarithmic scale; 1 for anything that has
+/// none.
+pub(crate) fn power_of_two(value: f64) -> f64 {
+    if value.is_normal() && value > 0.0 {
+        libm::ldexp(1.0, libm::round(libm::log2(value)) as i32)
+    } else {
+        1.0
+    }
+}

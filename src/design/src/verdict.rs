@@ -1,0 +1,298 @@
+//! Verdicts a person can use: which inequality, what went wrong, what to try.
+
+use super::ControlSpec;
+use serde::{Deserialize, Serialize};
+use std::fmt;
+
+/// What an inequality demands.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum BlockKind {
+    /// The closed loop's state shrinks by the decay rate each sample.
+    Decay,
+    /// The disturbance reaches the performance signal attenuated to gamma.
+    Attenuation,
+    /// The observer's error shrinks by its decay rate each sample.
+    ObserverDecay,
+    /// The Lyapunov functions of two modes differ by at most the factor mu.
+    LyapunovRatio,
+    /// The Lyapunov matrix itself is positive definite.
+    Lyapunov,
+    /// A theorem as the paper prints it.
+    Printed,
+}
+
+/// The name of an inequality: its kind, the mode, and the mode that follows it.
+#[derive(Clone, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
+pub struct BlockName {
+    /// What it demands.
+    pub kind: BlockKind,
+    /// Number of the active mode, from 1.
+    pub mode: usize,
+    /// Number of the mode that is active one sample later, from 1.
+    pub successor: usize,
+}
+
+impl BlockName {
+    /// Names an inequality by mode *indices* (from 0).
+    pub fn new(kind: BlockKind, mode: usize, successor: usize) -> Self {
+        Self {
+            kind,
+            mode: mode + 1,
+            successor: successor + 1,
+        }
+    }
+}
+
+impl fmt::Display for BlockName {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let kind = match self.kind {
+            BlockKind::Decay => "decay",
+            BlockKind::Attenuation => "attenuation",
+            BlockKind::ObserverDecay => "observer decay",
+            BlockKind::LyapunovRatio => "Lyapunov ratio",
+            BlockKind::Lyapunov => "Lyapunov matrix",
+            BlockKind::Printed => "printed inequality",
+        };
+        write!(f, "{kind} of mode {}", self.mode)?;
+        if self.successor != self.mode {
+            write!(f, " when mode {} follows", self.successor)?;
+        }
+        Ok(())
+    }
+}
+
+/// An inequality and how much of the conflict it carries.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct ConflictingBlock {
+    /// Which one.
+    #[serde(flatten)]
+    pub name: BlockName,
+    /// Its share of the dual multiplier, 0 to 1; the shares of all blocks add up to 1.
+    pub weight: f64,
+}
+
+/// A change of the design that was tried, all the way to certified gains, and works.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Advice {
+    /// Ask for a slower decay.
+    Decay(f64),
+    /// Ask for another kind of stability guarantee.
+    Lyapunov(super::Lyapunov),
+    /// Ask for another kind of guarantee and a slower decay.
+    LyapunovAndDecay(super::Lyapunov, f64),
+    /// Track fewer outputs (indices from 0).
+    Tracked(Vec<usize>),
+    /// Keep only so many of the internal model's harmonics.
+    Harmonics(usize),
+}
+
+impl Advice {
+    /// The request with this advice followed.
+    pub fn apply(&self, spec: &ControlSpec) -> ControlSpec {
+        let mut changed = spec.clone();
+        match self {
+            Self::Decay(decay) => changed.decay = *decay,
+            Self::Lyapunov(lyapunov) => changed.lyapunov = *lyapunov,
+            Self::LyapunovAndDecay(lyapunov, decay) => {
+                changed.lyapunov = *lyapunov;
+                changed.decay = *decay;
+            }
+            Self::Tracked(outputs) => {
+                let kept = |weights: &[f64]| {
+                    let all = spec.tracked.iter().zip(weights);
+                    all.filter(|(output, _)| outputs.contains(output))
+                        .map(|(_, weight)| *weight)
+                        .collect()
+                };
+                changed.output_weight = kept(&spec.output_weight);
+                changed.integral_weight = kept(&spec.integral_weight);
+                changed.tracked.clone_from(outputs);
+            }
+            Self::Harmonics(count) => changed.resonators.truncate(*count),
+        }
+        changed
+    }
+
+    /// Decay rates that are tried when a faster one is infeasible.
+    #[cfg(feature = "solver")]
+    pub(crate) const DECAYS: [f64; 10] = [0.5, 0.6, 0.7, 0.8, 0.9, 0.95, 0.98, 0.99, 0.995, 0.999];
+}
+
+impl fmt::Display for Advice {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Decay(decay) => write!(f, "a slower decay is feasible: decay = {decay}"),
+            Self::Lyapunov(kind) => {
+                write!(f, "another guarantee is feasible: lyapunov = \"{kind}\"")
+            }
+            Self::LyapunovAndDecay(kind, decay) => write!(
+                f,
+                "another guarantee with a slower decay is feasible: lyapunov = \"{kind}\", decay = {decay}"
+            ),
+            Self::Harmonics(0) => write!(
+                f,
+                "integral action alone is feasible: internal_model = false"
+            ),
+            Self::Harmonics(count) => write!(
+                f,
+                "an internal model of fewer harmonics is feasible: harmonics = {count}"
+            ),
+            Self::Tracked(outputs) => {
+                let numbers: Vec<String> = outputs.iter().map(|o| (o + 1).to_string()).collect();
+                write!(
+                    f,
+                    "tracking fewer outputs is feasible: tracked = [{}]",
+                    numbers.join(", ")
+                )
+            }
+        }
+    }
+}
+
+/// A conflict between inequalities, found by the margin problem.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Infeasibility {
+    /// The largest `t` for which every normalised inequality holds with `>= t I`; not positive.
+    pub margin: f64,
+    /// Who holds the margin down, the heaviest first.
+    pub blocks: Vec<ConflictingBlock>,
+    /// Changes that were tried and help; empty when none of those tried does.
+    pub advice: Vec<Advice>,
+}
+
+impl fmt::Display for Infeasibility {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(
+            f,
+            "the design is infeasible (best margin {:.1e})",
+            self.margin
+        )?;
+        let heavy: Vec<String> = self
+            .blocks
+            .iter()
+            .take(4)
+            .map(|block| format!("{} ({:.0} %)", block.name, 100.0 * block.weight))
+            .collect();
+        if !heavy.is_empty() {
+            write!(f, ": these conflict: {}", heavy.join(", "))?;
+        }
+        match self.advice.is_empty() {
+            true => write!(
+                f,
+                "; none of the usual changes (slower decay, dwell, fewer tracked outputs) helps"
+            ),
+            false => write!(f, "; {}", join(&self.advice)),
+        }
+    }
+}
+
+/// Everything that helps, in one line.
+fn join(advice: &[Advice]) -> String {
+    let advice: Vec<String> = advice.iter().map(ToString::to_string).collect();
+    advice.join("; ")
+}
+
+/// The solver came back with nothing that could be a solution.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum SolverFailure {
+    /// It claims that no point satisfies the inequalities.
+    #[error("it found the inequalities contradictory")]
+    Contradiction,
+    /// The objective falls without bound.
+    #[error("it found the objective unbounded: give a weight on every input")]
+    Unbounded,
+    /// The iteration limit was reached.
+    #[error("it did not finish within its iteration limit: scale the plant by nominal values")]
+    TooManyIterations,
+    /// Numbers broke down.
+    #[error("its numbers broke down: scale the plant by nominal values")]
+    NumericalTrouble,
+    /// The problem or the settings were refused.
+    #[error("it refused the problem")]
+    Refused,
+}
+
+/// Why there is no design.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum DesignError {
+    /// The request itself cannot be met or is ill-formed; one sentence says why.
+    #[error("{0}")]
+    Request(String),
+    /// The inequalities conflict.
+    #[error("{0}")]
+    Infeasible(Infeasibility),
+    /// The solver failed.
+    #[error("the solver gave no solution: {0}")]
+    Solver(#[from] SolverFailure),
+    /// The gains were found, but their certificate does not check.
+    #[error("{0}")]
+    Uncertified(Uncertified),
+}
+
+/// A certificate that does not check, and what would help.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Uncertified {
+    /// What could not be proved.
+    pub reason: super::CertificateError,
+    /// Changes that were tried and help; empty when none of those tried does.
+    pub advice: Vec<Advice>,
+}
+
+impl fmt::Display for Uncertified {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let help = match self.advice.is_empty() {
+            true => "give nominal values of the signals or ask for another decay".into(),
+            false => join(&self.advice),
+        };
+        write!(
+            f,
+            "the design could not be certified: {}; {help}",
+            self.reason
+        )
+    }
+}
+
+impl From<super::CertificateError> for DesignError {
+    fn from(reason: super::CertificateError) -> Self {
+        Self::Uncertified(Uncertified {
+            reason,
+            advice: Vec::new(),
+        })
+    }
+}
+
+#[cfg(feature = "solver")]
+impl DesignError {
+    /// Where advice on this error belongs; `None` where a changed request is not what is missing.
+    pub(crate) fn advice_mut(&mut self) -> Option<&mut Vec<Advice>> {
+        match self {
+            Self::Infeasible(infeasibility) => Some(&mut infeasibility.advice),
+            Self::Uncertified(uncertified) => Some(&mut uncertified.advice),
+            Self::Request(_) | Self::Solver(_) => None,
+        }
+    }
+}
+
+/// The verdict on a conflict, without advice.
+#[cfg(feature = "solver")]
+pub(crate) fn infeasible(margin: f64, weights: Vec<(BlockName, f64)>) -> DesignError {
+    DesignError::Infeasible(Infeasibility {
+        margin: margin.min(0.0),
+        blocks: by_weight(weights),
+        advice: Vec::new(),
+    })
+}
+
+/// The blocks that carry a conflict, the heaviest first.
+#[cfg(feature = "solver")]
+pub(crate) fn by_weight(weights: Vec<(BlockName, f64)>) -> Vec<ConflictingBlock> {
+    let mut blocks: Vec<ConflictingBlock> = weights
+        .into_iter()
+        .filter(|(_, weight)| *weight > 1e-3)
+        .map(|(name, weight)| ConflictingBlock { name, weight })
+        .collect();
+    blocks.sort_by(|x, y| y.weight.total_cmp(&x.weight));
+    blocks
+}

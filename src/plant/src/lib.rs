@@ -1,0 +1,123 @@
+//! The switched plant: known linear modes, one active at a time.
+//!
+//! Mode `i` obeys, with sample time `Te`,
+//!
+//! ```text
+//! x(k+1) = x0 + A (x(k) - x0) + B (u(k) - u0) + E w(k)
+//! y(k)   = y0 + C (x(k) - x0) + f(k) + F w(k)
+//! ```
+//!
+//! where `(x0, u0, y0)` is the mode's operating point (zero when absent), `w` the periodic
+//! disturbance and `f` the additive sensor fault. Everything is in the user's physical units.
+
+mod dimensions;
+pub mod noise;
+pub mod rectifier;
+pub mod rows;
+pub mod scaling;
+pub mod scenario;
+mod truth;
+
+pub use dimensions::Dimensions;
+pub use scenario::Scenario;
+pub use truth::Truth;
+
+use nalgebra::{DMatrix, DVector};
+use serde::{Deserialize, Serialize};
+
+/// A point around which a mode was linearised; a steady state of that mode.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct OperatingPoint {
+    /// State `x0` (n).
+    pub x: Vec<f64>,
+    /// Input `u0` (m).
+    pub u: Vec<f64>,
+    /// Output `y0` (p).
+    pub y: Vec<f64>,
+}
+
+/// One linear mode; the paper's `(A_i, B_i, C_i, E_i)` of (1) with both disturbance channels.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Mode {
+    /// What the user calls it.
+    pub name: String,
+    /// State matrix `A` (n x n).
+    #[serde(with = "rows")]
+    pub a: DMatrix<f64>,
+    /// Input matrix `B` (n x m).
+    #[serde(with = "rows")]
+    pub b: DMatrix<f64>,
+    /// Output matrix `C` (p x n).
+    #[serde(with = "rows")]
+    pub c: DMatrix<f64>,
+    /// Disturbance to state, `E` (n x s); zero columns when the plant knows no disturbance.
+    #[serde(with = "rows")]
+    pub e: DMatrix<f64>,
+    /// Disturbance to output, `F` (p x s).
+    #[serde(with = "rows")]
+    pub f: DMatrix<f64>,
+    /// Where the mode was linearised.
+    pub operating_point: OperatingPoint,
+}
+
+/// A plant that switches between known modes by a known signal.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct SwitchedPlant {
+    /// Sample time `Te` in seconds.
+    pub sample_time: f64,
+    /// The modes; mode number `i` of the user is `modes[i - 1]`.
+    pub modes: Vec<Mode>,
+}
+
+impl OperatingPoint {
+    /// The origin.
+    pub fn zero(states: usize, inputs: usize, outputs: usize) -> Self {
+        Self {
+            x: vec![0.0; states],
+            u: vec![0.0; inputs],
+            y: vec![0.0; outputs],
+        }
+    }
+}
+
+impl Mode {
+    /// The affine term of the state equation, `x0 - A x0 - B u0` (n).
+    pub fn state_offset(&self) -> DVector<f64> {
+        let x0 = DVector::from_column_slice(&self.operating_point.x);
+        let u0 = DVector::from_column_slice(&self.operating_point.u);
+        &x0 - &self.a * &x0 - &self.b * u0
+    }
+
+    /// The affine term of the output equation, `y0 - C x0` (p).
+    pub fn output_offset(&self) -> DVector<f64> {
+        let x0 = DVector::from_column_slice(&self.operating_point.x);
+        DVector::from_column_slice(&self.operating_point.y) - &self.c * x0
+    }
+
+    /// The largest magnitude of an eigenvalue of `A`.
+    pub fn spectral_radius(&self) -> f64 {
+        spectral_radius(&self.a)
+    }
+}
+
+impl SwitchedPlant {
+    /// Sizes; every mode has the same (see [`Dimensions::check`]).
+    pub fn dimensions(&self) -> Dimensions {
+        let mode = &self.modes[0];
+        Dimensions {
+            states: mode.a.nrows(),
+            inputs: mode.b.ncols(),
+            outputs: mode.c.nrows(),
+            disturbances: mode.e.ncols(),
+        }
+    }
+}
+
+/// The largest magnitude of an eigenvalue of a square matrix.
+pub fn spectral_radius(matrix: &DMatrix<f64>) -> f64 {
+    matrix
+        .complex_eigenvalues()
+        .iter()
+        .map(|lambda| lambda.norm())
+        .fold(0.0, f64::max)
+}

@@ -1,0 +1,35 @@
+//! The additive fault-tolerant control of the paper's section III.
+
+use ftc_control::ControllerParameters;
+use ftc_control::parameters::Compensation;
+use ftc_design::assembly::{feedback, scaling};
+use ftc_design::{ControlSpec, Design, DesignError, Objective, state_feedback};
+
+/// The same controller with the gains of T1 (decay only, no attenuation of the disturbance) and
+/// the additive control as printed in place of the design's compensation.
+///
+/// # Errors
+/// [`DesignError::Request`] for a design that was not synthesised, else as
+/// [`state_feedback::synthesise`].
+pub fn additive(design: &Design) -> Result<ControllerParameters, DesignError> {
+    let synthesis = design.synthesis.as_ref().ok_or_else(|| {
+        DesignError::Request("the gains were not made by synthesis: design them again".into())
+    })?;
+    let spec = ControlSpec {
+        objective: Objective::Decay,
+        ..synthesis.state_feedback.spec.clone()
+    };
+    let ours = &design.controller.feedback;
+    let plant = &design.controller.plant;
+    let control = state_feedback::synthesise(plant, &spec, &scaling(&design.signals))?;
+    let mut parameters = design.controller.clone();
+    parameters.compensation = Compensation::Additive;
+    parameters.feedback = feedback(
+        &control,
+        plant,
+        ours.bumpless,
+        ours.has_feedforward(),
+        &parameters.input_limits,
+    );
+    Ok(parameters)
+}

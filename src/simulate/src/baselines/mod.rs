@@ -1,0 +1,11 @@
+//! What the proposed controller is compared with.
+
+#[cfg(feature = "solver")]
+mod additive;
+mod deadbeat;
+#[cfg(feature = "solver")]
+pub mod predictive;
+
+#[cfg(feature = "solver")]
+pub use additive::additive;
+pub use deadbeat::{deadbeat_bound, response_delay};

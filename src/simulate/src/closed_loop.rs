@@ -1,0 +1,258 @@
+//! The closed loop, controller first and then plant: what two coupled FMUs compute.
+
+use super::metrics::{self, Merit};
+use super::plant::{External, PlantSimulator, PlantState};
+use ftc_control::{Compensate, Controller, ControllerState, Sample};
+use serde::Serialize;
+
+/// Who closes the loop.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Variant {
+    /// The design as it is: faults estimated and compensated.
+    Ftc,
+    /// The same gains, believing every sensor.
+    NoFtc,
+    /// The same gains, told the true fault: what a perfect estimate of it would give. One that also
+    /// takes up disturbance or noise may do better.
+    ToldTheFault,
+    /// The additive FTC of the paper's section III: gains of Theorem 1, no attenuation.
+    Additive,
+    /// Model predictive control without fault estimation.
+    Predictive,
+}
+
+impl Variant {
+    /// The ways to run one controller, in the order they are reported.
+    pub const ALL: [Self; 3] = [Self::Ftc, Self::NoFtc, Self::ToldTheFault];
+
+    /// Its name in files.
+    pub fn key(self) -> &'static str {
+        match self {
+            Self::Ftc => "ftc",
+            Self::NoFtc => "no_ftc",
+            Self::ToldTheFault => "told_the_fault",
+            Self::Additive => "additive",
+            Self::Predictive => "mpc",
+        }
+    }
+}
+
+/// Whatever closes the loop: sees the plant's outputs, gives a command.
+pub trait Regulator {
+    /// One tick.
+    fn tick(&mut self, seen: &PlantState);
+    /// Told which input (m) acts over the coming sample.
+    fn advance(&mut self, _seen: &PlantState, _acting: &[f64]) {}
+    /// The command (m).
+    fn command(&self) -> &[f64];
+    /// What else it has to say.
+    fn report(&self) -> Report<'_>;
+}
+
+/// A regulator's inner signals after a tick.
+#[derive(Clone, Copy, Debug)]
+pub struct Report<'a> {
+    /// State estimate (n).
+    pub estimate: &'a [f64],
+    /// Fault estimate (p).
+    pub fault: &'a [f64],
+    /// Residual (p).
+    pub residual: &'a [f64],
+    /// Declared faults (p).
+    pub flagged: &'a [bool],
+}
+
+/// Every signal of one sample.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Record {
+    /// Tick.
+    pub tick: u64,
+    /// Active mode (0-based).
+    pub mode: usize,
+    /// Reference (r).
+    pub reference: Vec<f64>,
+    /// Disturbance (s).
+    pub disturbance: Vec<f64>,
+    /// Noise (p).
+    pub noise: Vec<f64>,
+    /// True fault (p).
+    pub fault: Vec<f64>,
+    /// Measured output (p).
+    pub y: Vec<f64>,
+    /// True output (p).
+    pub y_true: Vec<f64>,
+    /// Plant state (n).
+    pub x: Vec<f64>,
+    /// Command (m).
+    pub u: Vec<f64>,
+    /// State estimate (n).
+    pub x_hat: Vec<f64>,
+    /// Fault estimate (p).
+    pub f_hat: Vec<f64>,
+    /// Residual (p).
+    pub residual: Vec<f64>,
+    /// Declared faults (p).
+    pub flagged: Vec<bool>,
+}
+
+/// One run.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Trajectory {
+    /// How the controller was run.
+    pub variant: Variant,
+    /// One record per sample.
+    pub records: Vec<Record>,
+    /// The first tick, if any, that the plant's equations could not be integrated through; what
+    /// follows it means nothing.
+    pub stalled: Option<u64>,
+}
+
+/// Figures of merit of one tracked output.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct Merits {
+    /// What the sensor says.
+    pub measured: Merit,
+    /// What the plant does.
+    pub truth: Merit,
+}
+
+/// The tolerant controller in one of its variants.
+struct Tolerant<'a> {
+    controller: &'a Controller,
+    state: ControllerState,
+    variant: Variant,
+}
+
+impl Regulator for Tolerant<'_> {
+    fn tick(&mut self, seen: &PlantState) {
+        let compensate = match self.variant {
+            Variant::NoFtc => Compensate::Nothing,
+            Variant::ToldTheFault => Compensate::Known(&seen.fault),
+            _ => Compensate::Estimate,
+        };
+        let sample = Sample {
+            tick: seen.tick,
+            mode: seen.mode,
+            measurement: &seen.y,
+            reference: &seen.reference,
+            thresholds: &self.controller.parameters().estimator.thresholds,
+            compensate,
+        };
+        self.controller.tick(&mut self.state, &sample);
+    }
+
+    fn command(&self) -> &[f64] {
+        &self.state.command
+    }
+
+    fn report(&self) -> Report<'_> {
+        let estimator = &self.state.estimator;
+        Report {
+            estimate: &self.state.observer.estimate,
+            fault: &estimator.fault,
+            residual: &estimator.residual,
+            flagged: &estimator.flagged,
+        }
+    }
+}
+
+/// Runs the scenario once with the tolerant controller. With latency 1 the command computed at a
+/// tick acts from the next tick on, as it does when a master steps both FMUs in parallel.
+pub fn run(plant: &PlantSimulator, controller: &Controller, variant: Variant) -> Trajectory {
+    let state = controller.initial_state(plant.initial_state().mode);
+    let delayed = controller.parameters().feedback.latency > 0;
+    run_with(
+        plant,
+        &mut Tolerant {
+            controller,
+            state,
+            variant,
+        },
+        variant,
+        delayed,
+    )
+}
+
+/// Runs the scenario once with any regulator; `delayed` commands act one tick later.
+pub fn run_with(
+    plant: &PlantSimulator,
+    regulator: &mut dyn Regulator,
+    variant: Variant,
+    delayed: bool,
+) -> Trajectory {
+    let mut state = plant.initial_state();
+    let mut acting = regulator.command().to_vec();
+    let silent_fault = vec![0.0; state.y.len()];
+    let silent_disturbance = vec![0.0; state.disturbance.len()];
+    let external = External {
+        fault: &silent_fault,
+        disturbance: &silent_disturbance,
+        mode: None,
+        noise: true,
+    };
+    let mut records = Vec::with_capacity(plant.scenario().steps as usize);
+    let mut stalled = None;
+    for _ in 0..plant.scenario().steps {
+        plant.observe(&mut state, &external);
+        regulator.tick(&state);
+        records.push(record(&state, regulator));
+        if !delayed {
+            acting.copy_from_slice(regulator.command());
+        }
+        regulator.advance(&state, &acting);
+        let tick = state.tick;
+        if plant.advance(&mut state, &acting).is_err() {
+            stalled = stalled.or(Some(tick));
+        }
+        acting.copy_from_slice(regulator.command());
+    }
+    Trajectory {
+        variant,
+        records,
+        stalled,
+    }
+}
+
+fn record(plant: &PlantState, regulator: &dyn Regulator) -> Record {
+    let report = regulator.report();
+    Record {
+        tick: plant.tick,
+        mode: plant.mode,
+        reference: plant.reference.clone(),
+        disturbance: plant.disturbance.clone(),
+        noise: plant.noise.clone(),
+        fault: plant.fault.clone(),
+        y: plant.y.clone(),
+        y_true: plant.y_true.clone(),
+        x: plant.x.clone(),
+        u: regulator.command().to_vec(),
+        x_hat: report.estimate.to_vec(),
+        f_hat: report.fault.to_vec(),
+        residual: report.residual.to_vec(),
+        flagged: report.flagged.to_vec(),
+    }
+}
+
+impl Trajectory {
+    /// Figures of merit of each tracked output (rows of `tracked`, 0-based), as far as the plant could
+    /// be integrated.
+    pub fn merits(&self, tracked: &[usize]) -> Vec<Merits> {
+        tracked
+            .iter()
+            .enumerate()
+            .map(|(index, &row)| {
+                let sound = |record: &&Record| self.stalled.is_none_or(|end| record.tick <= end);
+                let column = |pick: &dyn Fn(&Record) -> f64| {
+                    let records = self.records.iter().take_while(sound);
+                    records.map(pick).collect::<Vec<f64>>()
+                };
+                let reference = column(&|r| r.reference[index]);
+                Merits {
+                    measured: metrics::merit(&column(&|r| r.y[row]), &reference),
+                    truth: metrics::merit(&column(&|r| r.y_true[row]), &reference),
+                }
+            })
+            .collect()
+    }
+}

@@ -1,0 +1,365 @@
+//! The plant under a scenario, sample by sample: what the plant FMU runs.
+
+mod derivative;
+mod rectifier;
+
+pub use derivative::Change;
+
+use super::integrate::Stalled;
+use ftc_control::kernel;
+use ftc_control::state::State;
+use ftc_plant::Truth;
+use ftc_plant::noise;
+use ftc_plant::scenario::{FaultEvent, Scenario};
+use ftc_plant::{Mode, SwitchedPlant};
+use serde::{Deserialize, Serialize};
+
+/// A plant and its scenario: immutable, shared by any number of [`PlantState`]s.
+#[derive(Clone, Debug)]
+pub struct PlantSimulator {
+    plant: SwitchedPlant,
+    truth: Truth,
+    scenario: Scenario,
+    offsets: Vec<Offsets>,
+}
+
+/// The affine terms of one mode.
+#[derive(Clone, Debug)]
+struct Offsets {
+    /// `x0 - A x0 - B u0` (n).
+    state: Vec<f64>,
+    /// `y0 - C x0` (p).
+    output: Vec<f64>,
+}
+
+/// Signals added from outside, or in place of the scenario.
+#[derive(Clone, Copy, Debug)]
+pub struct External<'a> {
+    /// Fault added to each sensor (p).
+    pub fault: &'a [f64],
+    /// Disturbance added to each channel (s).
+    pub disturbance: &'a [f64],
+    /// When set, the scenario's reference, fault, disturbance and schedule are off and this mode (0-based) is active.
+    pub mode: Option<usize>,
+    /// Whether the scenario's measurement noise is on.
+    pub noise: bool,
+}
+
+/// The plant at one tick, with every signal an outside observer may see.
+#[derive(Debug, PartialEq, Serialize, Deserialize)]
+pub struct PlantState {
+    /// Tick this state belongs to.
+    pub tick: u64,
+    /// Active mode (0-based).
+    pub mode: usize,
+    /// State `x` (n).
+    pub x: Vec<f64>,
+    /// Measured output `y` (p).
+    pub y: Vec<f64>,
+    /// True output, without fault and noise (p).
+    pub y_true: Vec<f64>,
+    /// Fault `f`: what the sensor's failure adds (p); zero where the sensor gives no number.
+    pub fault: Vec<f64>,
+    /// Disturbance `w` (s).
+    pub disturbance: Vec<f64>,
+    /// Reference `y_ref` (r).
+    pub reference: Vec<f64>,
+    /// Measurement noise (p).
+    pub noise: Vec<f64>,
+    /// Last reading outside any event (p), for sensors that get stuck.
+    last: Vec<f64>,
+    /// Scratch (n).
+    next: Vec<f64>,
+}
+
+ftc_control::state!(PlantState {
+    parts: [
+        x,
+        y,
+        y_true,
+        fault,
+        disturbance,
+        reference,
+        noise,
+        last,
+        next
+    ],
+    constants: [],
+    counters: [tick, mode]
+});
+
+impl PlantSimulator {
+    /// Prepares a plant that is what it was designed for; see [`with_truth`](Self::with_truth).
+    pub fn new(plant: SwitchedPlant, scenario: Scenario) -> Self {
+        Self::with_truth(plant, Truth::AsDesigned, scenario)
+    }
+
+    /// Prepares a plant; the scenario's signals and the truth must have the design's sizes.
+    pub fn with_truth(designed: SwitchedPlant, truth: Truth, scenario: Scenario) -> Self {
+        let plant = truth.linear(&designed).clone();
+        let collect = |v: nalgebra::DVector<f64>| v.iter().copied().collect::<Vec<f64>>();
+        let offsets = plant.modes.iter().map(|mode| Offsets {
+            state: collect(mode.state_offset()),
+            output: collect(mode.output_offset()),
+        });
+        Self {
+            offsets: offsets.collect(),
+            plant,
+            truth,
+            scenario,
+        }
+    }
+
+    /// The plant simulated.
+    pub fn plant(&self) -> &SwitchedPlant {
+        &self.plant
+    }
+
+    /// The scenario.
+    pub fn scenario(&self) -> &Scenario {
+        &self.scenario
+    }
+
+    /// The mode (0-based) in which the scenario begins.
+    pub fn first_mode(&self) -> usize {
+        self.scenario.mode(0, self.plant.sample_time)
+    }
+
+    /// At rest in the scenario's first mode, tick 0, outputs not yet observed.
+    pub fn initial_state(&self) -> PlantState {
+        self.initial_state_in(self.first_mode())
+    }
+
+    /// At rest at the operating point of `mode` (0-based), tick 0, outputs not yet observed.
+    ///
+    /// # Panics
+    /// There is no such mode.
+    pub fn initial_state_in(&self, mode: usize) -> PlantState {
+        let dims = self.plant.dimensions();
+        let point = &self.plant.modes[mode].operating_point;
+        PlantState {
+            tick: 0,
+            mode,
+            x: point.x.clone(),
+            y: vec![0.0; dims.outputs],
+            y_true: vec![0.0; dims.outputs],
+            fault: vec![0.0; dims.outputs],
+            disturbance: vec![0.0; dims.disturbances],
+            reference: vec![0.0; self.scenario.reference.len()],
+            noise: vec![0.0; dims.outputs],
+            last: point.y.clone(),
+            next: vec![0.0; dims.states],
+        }
+    }
+
+    /// Whether a state has the sizes of this plant; one that came as bytes may not.
+    pub fn fits(&self, state: &PlantState) -> bool {
+        state.mode < self.plant.modes.len() && state.same_shape(&self.initial_state())
+    }
+
+    /// Makes every output of the present tick from the present state.
+    pub fn observe(&self, state: &mut PlantState, external: &External<'_>) {
+        let te = self.plant.sample_time;
+        let tick = state.tick;
+        let scenario = &self.scenario;
+        let built_in = external.mode.is_none();
+        state.mode = self.active_mode(external, tick);
+        let Some((mode, offsets)) = self.described(state.mode) else {
+            return;
+        };
+        let value = |signal: &ftc_plant::scenario::Waveform| {
+            if built_in { signal.at(tick, te) } else { 0.0 }
+        };
+        for (out, signal) in state.reference.iter_mut().zip(&scenario.reference) {
+            *out = value(signal);
+        }
+        for ((out, signal), &added) in state
+            .disturbance
+            .iter_mut()
+            .zip(&scenario.disturbance)
+            .zip(external.disturbance)
+        {
+            *out = value(signal) + added;
+        }
+        for ((out, signal), &added) in state
+            .fault
+            .iter_mut()
+            .zip(&scenario.fault)
+            .zip(external.fault)
+        {
+            *out = value(signal) + added;
+        }
+        self.draw_noise(state, external.noise);
+        kernel::affine(&mut state.y_true, &offsets.output, &mode.c, &state.x);
+        kernel::add_product(&mut state.y_true, &mode.f, &state.disturbance);
+        self.read_sensors(state, built_in);
+    }
+
+    /// The mode (0-based) at `tick`: the scenario's, unless another is given.
+    fn active_mode(&self, external: &External<'_>, tick: u64) -> usize {
+        external
+            .mode
+            .unwrap_or_else(|| self.scenario.mode(tick, self.plant.sample_time))
+            .min(self.plant.modes.len().saturating_sub(1))
+    }
+
+    /// The matrices and offsets of a mode (0-based), if there is such a mode.
+    fn described(&self, mode: usize) -> Option<(&Mode, &Offsets)> {
+        self.plant.modes.get(mode).zip(self.offsets.get(mode))
+    }
+
+    /// Moves to the next tick under input `u` (m), held over the sample.
+    ///
+    /// # Errors
+    /// [`Stalled`] where the nonlinear plant cannot be integrated; the tick then ends where that
+    /// became so, and later ticks go on from there.
+    pub fn advance(&self, state: &mut PlantState, u: &[f64]) -> Result<(), Stalled> {
+        let result = match &self.truth {
+            Truth::Rectifier(rectifier) => rectifier::advance_rectifier(
+                rectifier,
+                state.mode,
+                &mut state.x,
+                u,
+                &state.disturbance,
+                self.plant.sample_time,
+            ),
+            Truth::AsDesigned | Truth::Linear { .. } => {
+                self.advance_linear(state, u);
+                Ok(())
+            }
+        };
+        kernel::bound(&mut state.x);
+        state.tick = state.tick.saturating_add(1);
+        result
+    }
+
+    fn advance_linear(&self, state: &mut PlantState, u: &[f64]) {
+        let Some((mode, offsets)) = self.described(state.mode) else {
+            return;
+        };
+        kernel::affine(&mut state.next, &offsets.state, &mode.a, &state.x);
+        kernel::add_product(&mut state.next, &mode.b, u);
+        kernel::add_product(&mut state.next, &mode.e, &state.disturbance);
+        kernel::copy(&mut state.x, &state.next);
+    }
+
+    fn draw_noise(&self, state: &mut PlantState, on: bool) {
+        let deviation = &self.scenario.noise;
+        if !on || deviation.iter().all(|&d| d == 0.0) {
+            state.noise.fill(0.0);
+            return;
+        }
+        noise::standard_normal(self.scenario.seed, state.tick, &mut state.noise);
+        state
+            .noise
+            .iter_mut()
+            .zip(deviation)
+            .for_each(|(value, d)| *value *= d);
+    }
+
+    /// `y = y_true + f + noise`, unless an event replaces the reading.
+    fn read_sensors(&self, state: &mut PlantState, events: bool) {
+        let (tick, te) = (state.tick, self.plant.sample_time);
+        let clean = state.y_true.iter().zip(&state.noise);
+        let read = state
+            .y
+            .iter_mut()
+            .zip(&mut state.fault)
+            .zip(&mut state.last);
+        for (sensor, (((y, fault), last), (truth, noise))) in read.zip(clean).enumerate() {
+            let healthy = truth + noise;
+            let mut reading = healthy + *fault;
+            let mut struck = false;
+            for event in self.striking(sensor, tick, events) {
+                reading = event.reading(reading, *last, tick, te);
+                struck = true;
+            }
+            if !struck {
+                *last = reading;
+            } else if reading.is_finite() {
+                *fault = reading - healthy;
+            } else {
+                *fault = 0.0;
+            }
+            *y = reading;
+        }
+    }
+
+    /// The events present at a sensor (0-based) at `tick`; none where `events` are off.
+    fn striking(
+        &self,
+        sensor: usize,
+        tick: u64,
+        events: bool,
+    ) -> impl Iterator<Item = &FaultEvent> {
+        let te = self.plant.sample_time;
+        let all = self.scenario.events.iter();
+        all.filter(move |event| events && event.sensor == sensor && event.active(tick, te))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use ftc_plant::OperatingPoint;
+    use ftc_plant::scenario::{FaultKind, ModeInterval, Waveform};
+    use nalgebra::dmatrix;
+    use proptest::prelude::*;
+
+    /// Two states, one input, two outputs, one disturbance; an event on either sensor.
+    fn simulator() -> PlantSimulator {
+        let mode = Mode {
+            name: "only".into(),
+            a: dmatrix![0.5, 0.1; 0.0, 0.4],
+            b: dmatrix![1.0; 0.5],
+            c: dmatrix![1.0, 0.0; 0.0, 1.0],
+            e: dmatrix![1.0; 1.0],
+            f: dmatrix![0.0; 0.5],
+            operating_point: OperatingPoint::zero(2, 1, 2),
+        };
+        let event = |sensor, kind| FaultEvent {
+            sensor,
+            from: 0.0,
+            until: 9.0,
+            kind,
+        };
+        let plant = SwitchedPlant {
+            sample_time: 1.0,
+            modes: vec![mode],
+        };
+        let scenario = Scenario {
+            steps: 9,
+            noise: vec![0.1; 2],
+            seed: 1,
+            schedule: vec![ModeInterval { from: 0.0, mode: 0 }],
+            reference: vec![Waveform::ZERO],
+            fault: vec![Waveform::ZERO; 2],
+            events: vec![event(0, FaultKind::Stuck), event(1, FaultKind::Dropout)],
+            disturbance: vec![Waveform::ZERO],
+        };
+        PlantSimulator::new(plant, scenario)
+    }
+
+    proptest! {
+        /// What comes as bytes is compared with the plant's sizes; a tick must not rely on it.
+        #[test]
+        fn no_step_panics_whatever_the_sizes(
+            sizes in prop::array::uniform9(0usize..4), mode in 0usize..3,
+            given in prop::option::of(0usize..3), [m, p, s] in prop::array::uniform3(0usize..4),
+        ) {
+            let simulator = simulator();
+            let [x, y, y_true, fault, disturbance, reference, noise, last, next] = sizes.map(|size| vec![1.0; size]);
+            let mut state = PlantState { tick: 3, mode, x, y, y_true, fault, disturbance, reference, noise, last, next };
+            let (u, f, w) = (vec![1.0; m], vec![1.0; p], vec![1.0; s]);
+            let external = External { fault: &f, disturbance: &w, mode: given, noise: true };
+            simulator.advance(&mut state, &u).unwrap();
+            let mut trial = state.clone();
+            let change = Change { command: &u, fault: &f, disturbance: &w };
+            simulator.differentiate_outputs(&mut trial, &external, &change);
+            trial.mode = mode;
+            simulator.differentiate_tick(&mut trial, &external, &u, &change);
+            simulator.observe(&mut state, &external);
+            simulator.advance(&mut state, &u).unwrap();
+        }
+    }
+}

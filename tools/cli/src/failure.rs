@@ -1,0 +1,105 @@
+//! Why a command ends without success, and with which exit code.
+
+use ftc_design::{ControlSpec, DesignError};
+use report::summary;
+use std::fmt;
+use std::path::Path;
+use std::process::ExitCode;
+
+/// Why a command failed.
+#[derive(Debug)]
+pub enum Failure {
+    /// Something the user gave is at fault; one sentence says what and what to do.
+    Input(String),
+    /// The inputs are sound, but there is no such controller, or none that can be certified.
+    NoDesign {
+        /// The design file.
+        file: String,
+        /// What was asked for.
+        asked: Box<ControlSpec>,
+        /// Why not.
+        error: Box<DesignError>,
+        /// What to print to standard output beside the error.
+        output: Option<String>,
+    },
+    /// What was looked at does not hold what it promises.
+    Refused {
+        /// The file looked at.
+        file: String,
+        /// Why not; one sentence.
+        what: String,
+        /// What to print to standard output beside the error.
+        output: Option<String>,
+    },
+}
+
+impl Failure {
+    /// Sorts a design error: an ill-formed request is the design file's fault.
+    pub fn new(path: &Path, asked: ControlSpec, error: DesignError) -> Self {
+        let file = path.display().to_string();
+        match error {
+            DesignError::Request(what) => Self::Input(format!("{file}: {what}")),
+            error => Self::NoDesign {
+                file,
+                asked: Box::new(asked),
+                error: Box::new(error),
+                output: None,
+            },
+        }
+    }
+
+    /// An output directory that cannot be written to.
+    pub fn output_directory(error: package::output::Error) -> Self {
+        Self::Input(format!("--out {error}"))
+    }
+
+    /// The same failure, with a JSON object for standard output where there is a verdict.
+    pub fn explained_in_json(self) -> Self {
+        match self {
+            Self::NoDesign {
+                file, asked, error, ..
+            } => Self::NoDesign {
+                output: Some(summary::json_of_failure(&asked, &error)),
+                file,
+                asked,
+                error,
+            },
+            other => other,
+        }
+    }
+
+    /// What goes to standard output.
+    pub fn output(&self) -> Option<&str> {
+        match self {
+            Self::Input(_) => None,
+            Self::NoDesign { output, .. } | Self::Refused { output, .. } => output.as_deref(),
+        }
+    }
+
+    /// See the command line's help.
+    pub fn exit_code(&self) -> ExitCode {
+        match self {
+            Self::Input(_) => ExitCode::from(2),
+            Self::NoDesign { .. } | Self::Refused { .. } => ExitCode::from(1),
+        }
+    }
+}
+
+impl From<package::Error> for Failure {
+    fn from(error: package::Error) -> Self {
+        match error {
+            package::Error::Output(error) => Self::output_directory(error),
+            error => Self::Input(error.to_string()),
+        }
+    }
+}
+
+impl fmt::Display for Failure {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Input(what) => f.write_str(what),
+            Self::NoDesign { file, error, .. } => write!(f, "{file}: {error}"),
+            Self::Refused { file, what, .. } => write!(f, "{file}: {what}"),
+        }
+    }
+}

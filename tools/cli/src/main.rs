@@ -1,0 +1,346 @@
+//! `ftc-fmu`: from a design file to a certified controller, its FMUs and its simulation.
+//!
+//! ```text
+//! DESIGN.toml ── design-file ──> ftc_design ──┬─> report    (design, simulate)
+//!                                              └─> package   (export: two FMUs)
+//!                         FMU ────────────────────> package  (verify: the proof, once more)
+//!
+//! examples ── reproduce ──> a page, JSON and CSV per experiment of the paper
+//! ```
+//!
+//! The program reads arguments, calls these libraries, words what they return, and decides the exit
+//! code.
+
+mod as_printed;
+mod failure;
+mod progress;
+
+use clap::{Parser, Subcommand, ValueEnum};
+use design_file::schema::DesignFile;
+use failure::Failure;
+use ftc_design::Design;
+use ftc_design::assembly::Request;
+use package::output::Staging;
+use progress::Progress;
+use report::{summary, warnings};
+use serde_json::json;
+use std::fmt::Write as _;
+use std::io::Write;
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+
+/// Design, certify, export and simulate sensor-fault-tolerant controllers for switched linear plants.
+///
+/// A design file (TOML) describes the plant, what the controller shall do and an experiment;
+/// start from one of those in examples/.
+#[derive(Parser)]
+#[command(version, after_help = EXIT_CODES)]
+struct Arguments {
+    #[command(subcommand)]
+    command: Command,
+    /// Print nothing but errors.
+    #[arg(long, global = true)]
+    quiet: bool,
+}
+
+const EXIT_CODES: &str = "\
+Exit codes:
+  0  done
+  1  there is no such controller: the design is infeasible or could not be certified;
+     of verify: the FMU does not hold what it promises
+  2  the command line, a file or the output directory is at fault; nothing was written;
+     or standard output cannot be written to";
+
+#[derive(Subcommand)]
+enum Command {
+    /// Solve for the gains, certify them and print the report.
+    ///
+    /// The report tells per mode the attenuation gamma from the disturbance to the weighted
+    /// outputs, tracking-error integrals and inputs, and the spectral radius of the closed loop;
+    /// then the observer, how well the fault estimator's predictor fits, and what is certified.
+    #[command(after_help = EXIT_CODES)]
+    Design {
+        /// Design file (TOML).
+        design: PathBuf,
+        /// Print one JSON object instead, also when there is no such controller.
+        #[arg(long)]
+        json: bool,
+        /// Put the paper's Theorems 1 and 2 exactly as printed to the margin problem instead:
+        /// their best margins, and why they have no strictly feasible point.
+        #[arg(long)]
+        as_printed: bool,
+    },
+    /// Prove again, from the numbers in an FMU alone, what it promises. Nothing is solved.
+    ///
+    /// Checks that description, design and certificate belong together and that the gains which
+    /// run are those that were proved, then proves every inequality with rounding accounted for:
+    /// stability under arbitrary switching or beyond a dwell time, decay, and gamma per mode.
+    /// Of the binaries it checks that there is one, and of each the platform and the functions it
+    /// offers; what their machine code does is not proved.
+    #[command(after_help = EXIT_CODES)]
+    Verify {
+        /// FMU that ftc-fmu export wrote.
+        fmu: PathBuf,
+        /// Print one JSON object instead, also when the proof fails.
+        #[arg(long)]
+        json: bool,
+    },
+    /// Write NAME_controller.fmu and NAME_plant.fmu (FMI 2.0, co-simulation).
+    ///
+    /// The two close the loop: connect y, y_ref and mode from the plant to the controller, and u
+    /// back; step the controller first. The same design always gives the same bytes.
+    #[command(after_help = EXIT_CODES)]
+    Export {
+        /// Design file (TOML).
+        design: PathBuf,
+        /// Directory to write to; made if it does not exist.
+        #[arg(long, value_name = "DIR")]
+        out: PathBuf,
+        /// Also write NAME.ssp: both FMUs and their connections in one file (SSP 1.0).
+        #[arg(long)]
+        ssp: bool,
+    },
+    /// Run the design's scenario without any FMU: trajectories.csv, metrics.json, report.html and figures.
+    ///
+    /// Runs it three times: with fault tolerance (ftc), with the same gains believing every
+    /// sensor (no_ftc), and with the same gains told the true fault (told_the_fault): an estimate
+    /// that is perfect, yet takes up no disturbance and no noise.
+    #[command(after_help = EXIT_CODES)]
+    Simulate {
+        /// Design file (TOML).
+        design: PathBuf,
+        /// Directory to write to; made if it does not exist.
+        #[arg(long, value_name = "DIR")]
+        out: PathBuf,
+        /// Run two more: the paper's additive fault-tolerant control with gains that only decay
+        /// (additive) and model predictive control without fault estimation (mpc); and give the
+        /// error of a response as late as the plant needs and no later (deadbeat_bound).
+        #[arg(long)]
+        baselines: bool,
+    },
+    /// Run the paper's experiments and write one page each, with the same numbers as JSON and CSV.
+    ///
+    /// paper: its example in every variant, what it says beside what is found, and its figures.
+    /// converter: the AC/DC converter under every kind of sensor fault, against model predictive
+    /// control.
+    #[command(after_help = EXIT_CODES)]
+    Reproduce {
+        /// Which experiment.
+        experiment: Experiment,
+        /// Directory to write to; made if it does not exist.
+        #[arg(long, value_name = "DIR")]
+        out: PathBuf,
+    },
+}
+
+/// What can be reproduced.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+enum Experiment {
+    /// Section VII-A: the switched example, in every variant.
+    Paper,
+    /// Section VII-B: the AC/DC converter, against model predictive control.
+    Converter,
+}
+
+fn main() -> ExitCode {
+    let arguments = Arguments::parse();
+    match run(&arguments) {
+        Ok(_) if arguments.quiet => ExitCode::SUCCESS,
+        Ok(text) => print(&text).map_or_else(unprinted, |()| ExitCode::SUCCESS),
+        Err(failure) => {
+            let printed = failure.output().map_or(Ok(()), print);
+            eprintln!("error: {failure}");
+            printed.map_or_else(unprinted, |()| failure.exit_code())
+        }
+    }
+}
+
+/// Runs the command and returns what to print.
+fn run(arguments: &Arguments) -> Result<String, Failure> {
+    let progress = Progress::new(arguments.quiet);
+    match &arguments.command {
+        Command::Design {
+            design,
+            json,
+            as_printed: true,
+        } => {
+            let (_, request) = read(design, &progress)?;
+            progress.tell("looking for a margin");
+            as_printed::report(design, request, *json)
+        }
+        Command::Design { design, json, .. } => match (solve(design, &progress), json) {
+            (Ok(made), false) => Ok(summary::text(&made.design, &made.warnings)),
+            (Ok(made), true) => Ok(summary::json(&made.design, &made.warnings)),
+            (Err(failure), false) => Err(failure),
+            (Err(failure), true) => Err(failure.explained_in_json()),
+        },
+        Command::Verify { fmu, json } => verify(fmu, *json),
+        Command::Export { design, out, ssp } => {
+            check_output(out)?;
+            let made = solve(design, &progress)?;
+            export(&made, out, *ssp)
+        }
+        Command::Simulate {
+            design,
+            out,
+            baselines,
+        } => {
+            check_output(out)?;
+            let made = solve(design, &progress)?;
+            progress.tell("simulating");
+            simulate(made, out, *baselines)
+        }
+        Command::Reproduce { experiment, out } => {
+            check_output(out)?;
+            reproduce(*experiment, out, &progress)
+        }
+    }
+}
+
+/// Proves again what an FMU promises.
+fn verify(fmu: &Path, as_json: bool) -> Result<String, Failure> {
+    match package::verify(fmu) {
+        Ok(verification) if as_json => Ok(summary::pretty(&verification.json())),
+        Ok(verification) => Ok(verification.to_string()),
+        Err(package::Error::Unproved { fmu, what }) => Err(Failure::Refused {
+            output: as_json.then(|| summary::pretty(&json!({ "verified": false, "reason": what }))),
+            file: fmu.display().to_string(),
+            what,
+        }),
+        Err(error) => Err(error.into()),
+    }
+}
+
+/// Writes both FMUs and says for which platforms.
+fn export(made: &Made, out: &Path, ssp: bool) -> Result<String, Failure> {
+    let options = package::Options {
+        out: out.to_path_buf(),
+        binaries: beside_program()?,
+        ssp,
+    };
+    let exported = package::export(&made.design, &options)?;
+    let mut text = String::new();
+    for path in &exported.paths {
+        let _ = writeln!(text, "wrote {}", path.display());
+    }
+    let platforms: Vec<String> = exported
+        .packed
+        .iter()
+        .map(|packed| match packed.native {
+            true => format!("{} (built for this machine)", packed.platform),
+            false => packed.platform.into(),
+        })
+        .collect();
+    let _ = writeln!(text, "platforms: {}", platforms.join(", "));
+    for platform in &exported.outdated {
+        let _ = writeln!(
+            text,
+            "left out {platform}: its binaries are older than this program's: run make fmu-all"
+        );
+    }
+    Ok(text + &warnings::text(&made.warnings))
+}
+
+/// The directory of this program, where cargo leaves the FMU binaries as well.
+fn beside_program() -> Result<PathBuf, Failure> {
+    let program = std::env::current_exe().ok();
+    program
+        .and_then(|program| program.parent().map(Path::to_path_buf))
+        .ok_or_else(|| {
+            Failure::Input(
+                "cannot find the directory of this program: start it by its full path".into(),
+            )
+        })
+}
+
+/// Simulates a design and writes what was found.
+fn simulate(made: Made, out: &Path, baselines: bool) -> Result<String, Failure> {
+    let found = report::simulate::simulate(&made.design, made.warnings, baselines)
+        .map_err(Failure::Input)?;
+    write(out, &found.files)?;
+    let mut text = found.summary;
+    let _ = writeln!(
+        text,
+        "wrote {}, trajectories.csv, metrics.json and the figures",
+        out.join("report.html").display()
+    );
+    Ok(text + &warnings::text(&found.warnings))
+}
+
+/// Runs an experiment of the paper and writes its page.
+fn reproduce(experiment: Experiment, out: &Path, progress: &Progress) -> Result<String, Failure> {
+    let experiment = match experiment {
+        Experiment::Paper => reproduce::Experiment::Paper,
+        Experiment::Converter => reproduce::Experiment::Converter,
+    };
+    let found = reproduce::run(experiment, &|what| progress.tell(what)).map_err(Failure::Input)?;
+    write(out, &found.files)?;
+    let name = found.name;
+    Ok(format!(
+        "{}\nwrote {}, {name}.json and {name}.csv\n",
+        found.summary,
+        out.join(format!("{name}.html")).display()
+    ))
+}
+
+/// Refuses an output directory that cannot be written to, before anything long is begun.
+fn check_output(out: &Path) -> Result<(), Failure> {
+    Staging::new(out)
+        .map(drop)
+        .map_err(Failure::output_directory)
+}
+
+/// Writes all files, or none.
+fn write(out: &Path, files: &[(String, Vec<u8>)]) -> Result<(), Failure> {
+    let staging = Staging::new(out).map_err(Failure::output_directory)?;
+    files
+        .iter()
+        .try_for_each(|(name, bytes)| staging.add(name, bytes))
+        .and_then(|()| staging.commit())
+        .map(drop)
+        .map_err(Failure::output_directory)
+}
+
+/// Reads a design file.
+fn read(path: &Path, progress: &Progress) -> Result<(DesignFile, Request), Failure> {
+    progress.tell("reading the design file");
+    let file = design_file::read(path).map_err(Failure::Input)?;
+    let folder = path.parent().unwrap_or(Path::new(""));
+    design_file::assemble::request(&file, folder)
+        .map_err(|what| Failure::Input(format!("{}: {what}", path.display())))
+        .map(|request| (file, request))
+}
+
+/// A design, and what its user should know of it: one sentence each.
+struct Made {
+    design: Design,
+    warnings: Vec<String>,
+}
+
+/// Reads a design file and makes the design.
+fn solve(path: &Path, progress: &Progress) -> Result<Made, Failure> {
+    let (file, request) = read(path, progress)?;
+    let asked = request.control.clone();
+    let logged = warnings::Logged::of(&request.estimator.database);
+    progress.tell("solving for gains and certifying them");
+    let design = ftc_design::assembly::assemble(request)
+        .map_err(|error| Failure::new(path, asked, error))?;
+    let warnings = warnings::of_design(&file, logged.as_ref(), &design);
+    Ok(Made { design, warnings })
+}
+
+/// Prints to standard output; a reader that has gone away is no error of ours.
+fn print(text: &str) -> std::io::Result<()> {
+    let mut out = std::io::stdout().lock();
+    let result = out.write_all(text.as_bytes()).and_then(|()| out.flush());
+    match result {
+        Err(error) if error.kind() == std::io::ErrorKind::BrokenPipe => Ok(()),
+        result => result,
+    }
+}
+
+/// What the reader of standard output asked for is lost.
+fn unprinted(error: std::io::Error) -> ExitCode {
+    eprintln!("error: standard output cannot be written to ({error}): send it elsewhere");
+    ExitCode::from(2)
+}

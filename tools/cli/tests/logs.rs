@@ -1,0 +1,377 @@
+//! Databases of healthy operation from CSV files: what is read, and what is refused in one sentence.
+#![allow(missing_docs)]
+
+mod common;
+
+use common::{Bench, FILE, damaged};
+use std::fmt::Write;
+use std::fs;
+
+/// Rows of a log of one mode of the sound design: `t`, two inputs, two outputs.
+fn rows(mode: usize, samples: usize, from: usize) -> Vec<[f64; 5]> {
+    let a = [[[0.6, 0.45], [-0.2, 0.3]], [[0.4, -0.3], [0.11, 0.0]]][mode];
+    let b = [[[0.0, 1.0], [1.0, 0.0]], [[1.0, 0.0], [0.0, 1.0]]][mode];
+    let mut x = [0.0, 0.0];
+    let mut state = 17 + mode as u64;
+    let mut sign = || {
+        state = state
+            .wrapping_mul(6_364_136_223_846_793_005)
+            .wrapping_add(1);
+        if state >> 63 == 0 { 1.0 } else { -1.0 }
+    };
+    (from..from + samples)
+        .map(|k| {
+            let u = [sign(), sign()];
+            let row = [k as f64, u[0], u[1], x[0], x[1]];
+            let next = |i: usize| -> f64 { (0..2).map(|j| a[i][j] * x[j] + b[i][j] * u[j]).sum() };
+            x = [next(0), next(1)];
+            row
+        })
+        .collect()
+}
+
+/// A log as text; the outputs bear the names of the sound design.
+fn log(rows: &[[f64; 5]]) -> String {
+    let mut text = "t,u[1],u[2],a,b\n".to_string();
+    for [t, u1, u2, y1, y2] in rows {
+        let _ = writeln!(text, "{t},{u1},{u2},{y1},{y2}");
+    }
+    text
+}
+
+/// The two modes in one file, in stretches of a hundred samples.
+fn mixed() -> String {
+    let mut text = "t,mode,u[1],u[2],a,b\n".to_string();
+    for stretch in 0..6 {
+        for [t, u1, u2, y1, y2] in rows(stretch % 2, 100, 100 * stretch) {
+            let _ = writeln!(text, "{t},{},{u1},{u2},{y1},{y2}", stretch % 2 + 1);
+        }
+    }
+    text
+}
+
+/// The sound design with this database, and these files beside it.
+fn bench(database: &str, files: &[(&str, &str)]) -> Bench {
+    let bench = Bench::new(damaged(
+        "database = \"commission\"",
+        &format!("response_length = 15\ndatabase = {database}"),
+    ));
+    for (name, text) in files {
+        fs::write(bench.path(name), text).unwrap();
+    }
+    bench
+}
+
+const PAIR: &str = "[\"one.csv\", \"two.csv\"]";
+
+#[test]
+fn a_log_per_mode_and_one_with_a_mode_column_are_read() {
+    let (one, two) = (log(&rows(0, 200, 0)), log(&rows(1, 200, 0)));
+    // Other columns, spaces and names by number do no harm.
+    let other = one.replace("a,b\n", "y[1] , y[2]\n").replace("t,", "t, ");
+    for (database, files) in [
+        (PAIR, vec![("one.csv", one.as_str()), ("two.csv", &two)]),
+        (PAIR, vec![("one.csv", other.as_str()), ("two.csv", &two)]),
+        ("\"both.csv\"", vec![("both.csv", mixed().as_str())]),
+    ] {
+        let bench = bench(database, &files);
+        let run = bench.run(&["design", FILE, "--json"]);
+        assert_eq!(run.code(), 0, "{}", run.stderr());
+        let report = run.json();
+        for deviation in report["estimator"]["residual_deviation"]
+            .as_array()
+            .unwrap()
+        {
+            for value in deviation.as_array().unwrap() {
+                assert!(value.as_f64().unwrap() < 1e-2, "{report}");
+            }
+        }
+        let run = bench.run(&["simulate", FILE, "--out", "out"]);
+        assert_eq!(run.code(), 0, "{}", run.stderr());
+    }
+}
+
+/// The log is in physical units: the operating point of its mode is taken out.
+#[test]
+fn a_log_is_taken_about_the_operating_point() {
+    let shifted = |mode: usize| {
+        let mut rows = rows(mode, 200, 0);
+        for row in &mut rows {
+            for (value, shift) in row.iter_mut().zip([0.0, 3.0, -2.0, 5.0, 7.0]) {
+                *value += shift;
+            }
+        }
+        log(&rows)
+    };
+    let bench = bench(PAIR, &[("one.csv", &shifted(0)), ("two.csv", &shifted(1))]);
+    let deviation = || {
+        let report = bench.run(&["design", FILE, "--json"]).json();
+        let modes = &report["estimator"]["residual_deviation"];
+        modes[0][0].as_f64().unwrap()
+    };
+    assert!(deviation() > 0.1);
+    let design = fs::read_to_string(bench.path(FILE)).unwrap();
+    let point = "{ x = [5, 7], u = [3, -2], y = [5, 7] }";
+    let design = design.replace("{ x = [0, 0], u = [0, 0], y = [0, 0] }", point);
+    fs::write(bench.path(FILE), design).unwrap();
+    assert!(deviation() < 1e-2);
+}
+
+#[test]
+fn the_examples_logs_are_what_its_script_writes() {
+    let examples = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../../examples");
+    let bench = Bench::empty();
+    fs::copy(examples.join("logged.toml"), bench.path("logged.toml")).unwrap();
+    let status = std::process::Command::new("python3")
+        .arg(examples.join("record.py"))
+        .arg(bench.path("logged.toml"))
+        .status()
+        .unwrap();
+    assert!(status.success());
+    for name in ["logged_closed.csv", "logged_open.csv"] {
+        let (new, kept) = (bench.path(name), examples.join(name));
+        assert_eq!(
+            fs::read_to_string(new).unwrap(),
+            fs::read_to_string(kept).unwrap(),
+            "{name}"
+        );
+    }
+}
+
+/// One damaged log: what is wrong, the first file, and words the sentence must have.
+type Case = (&'static str, String, &'static [&'static str]);
+
+#[test]
+fn damaged_logs_are_refused_in_one_sentence() {
+    let good = rows(0, 200, 0);
+    let text = log(&good);
+    let line = |row: usize| text.lines().nth(row).unwrap().to_string();
+    let with = |row: usize, new: &str| text.replacen(&line(row), new, 1);
+    let without = |row: usize| text.replacen(&format!("{}\n", line(row)), "", 1);
+    let cell = |row: usize, column: usize, new: &str| {
+        let mut cells: Vec<String> = line(row).split(',').map(String::from).collect();
+        cells[column] = new.into();
+        with(row, &cells.join(","))
+    };
+    let still = |column: usize| {
+        let mut rows = good.clone();
+        for row in &mut rows {
+            row[column] = 0.0;
+        }
+        log(&rows)
+    };
+    let slow: Vec<[f64; 5]> = good
+        .iter()
+        .map(|row| [row[0], 1.0, row[2], row[3], row[4]])
+        .collect();
+    let twins: Vec<[f64; 5]> = good
+        .iter()
+        .map(|row| [row[0], row[1], row[1], row[3], row[4]])
+        .collect();
+    let cases: Vec<Case> = vec![
+        ("empty file", String::new(), &["no column"]),
+        ("header only", "t,u[1],u[2],a,b\n".into(), &["has no rows"]),
+        (
+            "missing output",
+            text.replacen(",b\n", ",c\n", 1),
+            &["no column b or y[2]", "use one of"],
+        ),
+        (
+            "an output less, next to its like",
+            text.replacen(",a,b\n", ",b,other\n", 1),
+            &["no column a or y[1]", "use one of t, other"],
+        ),
+        (
+            "misspelt input",
+            text.replacen("u[2]", "u2]", 1),
+            &["no column u[2]", "did you mean u2]?"],
+        ),
+        (
+            "column twice",
+            text.replacen(",b\n", ",a\n", 1),
+            &["two columns a"],
+        ),
+        (
+            "semicolons",
+            text.replace(',', ";"),
+            &["separate columns by commas"],
+        ),
+        (
+            "NaN",
+            cell(7, 3, "NaN"),
+            &["row 7 (line 8)", "column a", "'NaN'"],
+        ),
+        (
+            "infinity",
+            cell(7, 1, "inf"),
+            &["row 7 (line 8)", "column u[1]", "'inf'"],
+        ),
+        (
+            "empty cell",
+            cell(30, 4, ""),
+            &["row 30 (line 31)", "column b", "is empty"],
+        ),
+        (
+            "a word",
+            cell(30, 2, "off"),
+            &["row 30", "column u[2]", "'off'"],
+        ),
+        (
+            "too large",
+            cell(30, 2, "1e300"),
+            &["row 30", "column u[2]"],
+        ),
+        (
+            "time is no number",
+            cell(4, 0, "noon"),
+            &["row 4", "column t", "'noon'"],
+        ),
+        (
+            "a row lost",
+            without(50),
+            &["row 50 (line 51)", "from 48 to 50", "gaps"],
+        ),
+        (
+            "time stands still",
+            cell(9, 0, "7"),
+            &["row 9", "from 7 to 7", "sample_time is 1"],
+        ),
+        ("time goes back", cell(9, 0, "3"), &["row 9", "from 7 to 3"]),
+        ("jitter", cell(9, 0, "8.2"), &["row 9", "from 7 to 8.2"]),
+        (
+            "short row",
+            with(12, "11,1,1"),
+            &["line 13", "3 cells", "5"],
+        ),
+        (
+            "long row",
+            with(12, "11,1,1,0,0,0"),
+            &["line 13", "6 cells"],
+        ),
+        (
+            "too few samples",
+            log(&good[..40]),
+            &["mode 1", "40 samples are too few", "record at least"],
+        ),
+        (
+            "nothing moves",
+            {
+                let mut rows = good.clone();
+                for row in &mut rows {
+                    (row[1], row[2]) = (0.0, 0.0);
+                }
+                log(&rows)
+            },
+            &["mode 1", "excites nothing"],
+        ),
+        (
+            "one input never moves",
+            still(1),
+            &["mode 1", "input 1 (u[1])", "samples back", "too little"],
+        ),
+        (
+            "one input constant",
+            log(&slow),
+            &["mode 1", "input 1 (u[1])", "too little"],
+        ),
+        (
+            "inputs move together",
+            log(&twins),
+            &["mode 1", "input", "too little", "on its own"],
+        ),
+        (
+            "of another mode",
+            text.replace("t,", "mode,t,").replace('\n', "\n2,"),
+            &["row 1", "mode is 2", "log of mode 1"],
+        ),
+    ];
+    assert!(cases.len() >= 12);
+    let two = log(&rows(1, 200, 0));
+    for (case, one, words) in cases {
+        refused(case, PAIR, &[("one.csv", &one), ("two.csv", &two)], words);
+    }
+}
+
+#[test]
+fn files_that_do_not_fit_the_modes() {
+    let (one, two) = (log(&rows(0, 200, 0)), log(&rows(1, 200, 0)));
+    let pair = [("one.csv", one.as_str()), ("two.csv", two.as_str())];
+    refused(
+        "missing file",
+        PAIR,
+        &pair[..1],
+        &["two.csv", "cannot be opened"],
+    );
+    refused(
+        "one of two",
+        "[\"one.csv\"]",
+        &pair,
+        &["lists 1 logs", "one per mode, 2"],
+    );
+    refused("no list", "[]", &pair, &["lists 0 logs"]);
+    refused(
+        "no mode column",
+        "\"one.csv\"",
+        &pair,
+        &["2 modes", "no column mode"],
+    );
+    refused(
+        "not only logs",
+        "[\"one.csv\", \"model\"]",
+        &pair,
+        &["\"model\"", "CSV files only"],
+    );
+    let mixed = mixed();
+    let only_first: String = mixed
+        .lines()
+        .take(101)
+        .map(|line| format!("{line}\n"))
+        .collect();
+    let third = mixed.replacen("0,1,", "0,3,", 1);
+    let half = mixed.replacen("0,1,", "0,1.5,", 1);
+    let both = "\"both.csv\"";
+    refused(
+        "a mode is missing",
+        both,
+        &[("both.csv", &only_first)],
+        &["no sample of mode 2 (second)"],
+    );
+    refused(
+        "mode 3 of 2",
+        both,
+        &[("both.csv", &third)],
+        &["row 1 (line 2)", "mode is 3", "1 to 2"],
+    );
+    refused(
+        "mode 1.5",
+        both,
+        &[("both.csv", &half)],
+        &["row 1", "mode is 1.5"],
+    );
+    fs_refused_method(&pair);
+}
+
+/// A log that nobody reads is refused rather than ignored.
+fn fs_refused_method(pair: &[(&str, &str)]) {
+    let bench = bench(PAIR, pair);
+    let design = fs::read_to_string(bench.path(FILE)).unwrap();
+    let sliding = design.replace("method = \"reference\"", "method = \"sliding\"");
+    fs::write(bench.path(FILE), sliding).unwrap();
+    let run = bench.run(&["design", FILE]);
+    assert_eq!(run.code(), 2, "{}", run.stdout());
+    assert!(
+        run.stderr().contains("method = \"reference\""),
+        "{}",
+        run.stderr()
+    );
+}
+
+fn refused(case: &str, database: &str, files: &[(&str, &str)], words: &[&str]) {
+    let run = bench(database, files).run(&["design", FILE]);
+    let message = run.stderr();
+    assert_eq!(run.code(), 2, "{case}: {message}");
+    assert_eq!(message.trim_end().lines().count(), 1, "{case}: {message}");
+    for word in words {
+        assert!(message.contains(word), "{case}: no '{word}' in {message}");
+    }
+}

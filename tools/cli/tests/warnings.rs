@@ -1,0 +1,280 @@
+//! What is sound but worth a word is told in one sentence each: in the report, as JSON, on the page.
+#![allow(missing_docs)]
+
+mod common;
+
+use common::{Bench, FILE, SOUND, damaged};
+use std::fmt::Write;
+use std::fs;
+
+/// The warnings of `design --json`, each of which must also stand in the report for people.
+fn of_design(bench: &Bench) -> Vec<String> {
+    let run = bench.run(&["design", FILE, "--json"]);
+    assert_eq!(run.code(), 0, "{}", run.stderr());
+    let text = bench.run(&["design", FILE]).stdout();
+    sentences(&run.json()["warnings"], &text)
+}
+
+/// The warnings of `simulate`, which must stand in its summary and on its page too.
+fn of_run(bench: &Bench, more: &[&str]) -> Vec<String> {
+    let run = bench.run(&[&["simulate", FILE, "--out", "out"], more].concat());
+    assert_eq!(run.code(), 0, "{}", run.stderr());
+    let metrics = fs::read(bench.path("out/metrics.json")).unwrap();
+    let metrics: serde_json::Value = serde_json::from_slice(&metrics).unwrap();
+    let warnings = sentences(&metrics["warnings"], &run.stdout());
+    let page = fs::read_to_string(bench.path("out/report.html")).unwrap();
+    assert_eq!(page.contains("<h2>Warnings</h2>"), !warnings.is_empty());
+    for warning in &warnings {
+        assert!(page.contains(warning.as_str()), "{warning}");
+    }
+    warnings
+}
+
+fn sentences(list: &serde_json::Value, text: &str) -> Vec<String> {
+    let warnings: Vec<String> = serde_json::from_value(list.clone()).unwrap();
+    for warning in &warnings {
+        assert!(text.contains(&format!("warning: {warning}\n")), "{text}");
+        assert!(warning.len() < 400 && !warning.contains('\n'), "{warning}");
+    }
+    assert_eq!(text.matches("warning: ").count(), warnings.len(), "{text}");
+    warnings
+}
+
+/// Exactly one warning, with these words.
+fn one(warnings: &[String], words: &[&str]) {
+    assert_eq!(warnings.len(), 1, "{warnings:?}");
+    for word in words {
+        assert!(
+            warnings[0].contains(word),
+            "no '{word}' in: {}",
+            warnings[0]
+        );
+    }
+}
+
+/// A schedule that changes the mode every `period` samples.
+fn switching(every: usize) -> String {
+    let mut schedule = String::new();
+    for (place, from) in (0..60).step_by(every).enumerate() {
+        let _ = write!(schedule, "{{ from = {from}, mode = {} }}, ", place % 2 + 1);
+    }
+    damaged("{ from = 0, mode = 1 }, { from = 30, mode = 2 }", &schedule)
+}
+
+#[test]
+fn the_sound_design_needs_no_warning() {
+    let bench = Bench::new(damaged(
+        "sigmas = 6.0",
+        "sigmas = 6.0\nresponse_length = 12",
+    ));
+    assert_eq!(of_design(&bench), [""; 0]);
+}
+
+#[test]
+fn a_schedule_that_outruns_the_estimator() {
+    let bench =
+        Bench::new(switching(5).replace("sigmas = 6.0", "sigmas = 6.0\nresponse_length = 12"));
+    one(
+        &of_design(&bench),
+        &[
+            "11 of 11 switches",
+            "response_length = 12",
+            "no sensor is judged",
+        ],
+    );
+    let run = of_run(&bench, &[]);
+    assert_eq!(run.len(), 2, "{run:?}");
+    assert!(run[1].contains("ftc: in 100.0 % of the samples"), "{run:?}");
+    let quick = switching(5).replace("\"reference\"", "\"none\"");
+    assert_eq!(of_design(&Bench::new(quick)), [""; 0], "nothing to judge");
+}
+
+#[test]
+fn a_schedule_that_breaks_the_proved_dwell_time() {
+    let dwelling = |every| {
+        switching(every)
+            .replace("\"common\"", "\"dwell\"")
+            .replace("latency = 0", "latency = 1")
+            .replace("decay = 0.7\noutput", "decay = 0.9\noutput")
+            .replace("sigmas = 6.0", "sigmas = 6.0\nresponse_length = 2")
+    };
+    one(
+        &of_design(&Bench::new(dwelling(3))),
+        &["modes last 3.00 samples", "stability is proved only"],
+    );
+    assert_eq!(of_design(&Bench::new(dwelling(20))), [""; 0]);
+}
+
+/// References of a thousand, where inputs were said to move by one.
+#[test]
+fn a_reference_far_outside_the_database() {
+    let design = |nominal: f64, reference: f64| {
+        format!(
+            "name = \"far\"\nsample_time = 1.0\n[[mode]]\nA = [[0.8]]\nB = [[0.2]]\nC = [[1.0]]\n\
+             [signals]\ninputs = [{{ name = \"valve\", nominal = {nominal} }}]\n\
+             [controller]\ndecay = 0.9\n[scenario]\nsteps = 400\nnoise = 0.005\n\
+             reference = [{{ kind = \"steps\", points = [[0, {reference}], [150, 0]] }}]\n"
+        )
+    };
+    let far = Bench::new(design(1.0, 1000.0));
+    let words = [
+        "mode 1",
+        "valve = 1000 in steady state",
+        "nominal",
+        "thresholds open",
+    ];
+    one(&of_design(&far), &words);
+    let run = of_run(&far, &[]);
+    assert_eq!(run.len(), 2, "{run:?}");
+    assert!(
+        run[1].contains("outside what the healthy database spans"),
+        "{run:?}"
+    );
+    for near in [design(1000.0, 1000.0), design(1.0, 1.0)] {
+        let bench = Bench::new(near);
+        assert_eq!(of_run(&bench, &[]), [""; 0]);
+    }
+}
+
+#[test]
+fn thresholds_that_nothing_was_known_for() {
+    let silent = damaged("noise = 0.005\n", "").replace("sigmas = 6.0", "response_length = 12");
+    one(
+        &of_design(&Bench::new(&silent)),
+        &["scenario.noise", "estimator.threshold"],
+    );
+    for known in [
+        silent.replace("response_length", "threshold = 0.1\nresponse_length"),
+        silent.replace("steps = 60", "steps = 60\nnoise = 0.0"),
+        silent.replace("\"reference\"", "\"none\""),
+    ] {
+        assert_eq!(of_design(&Bench::new(known)), [""; 0]);
+    }
+}
+
+/// The example with logs, the first of them changed cell by cell: row, column of the first level.
+fn logged(change: impl Fn(usize, f64) -> f64) -> Bench {
+    let examples = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../../examples");
+    let read = |name: &str| fs::read_to_string(examples.join(name)).unwrap();
+    let bench = Bench::new(read("logged.toml"));
+    let mut text = String::new();
+    for (row, line) in read("logged_closed.csv").lines().enumerate() {
+        let mut cells: Vec<String> = line.split(',').map(String::from).collect();
+        if let Ok(level) = cells[3].parse::<f64>() {
+            cells[3] = change(row, level).to_string();
+        }
+        let _ = writeln!(text, "{}", cells.join(","));
+    }
+    fs::write(bench.path("logged_closed.csv"), text).unwrap();
+    fs::write(bench.path("logged_open.csv"), read("logged_open.csv")).unwrap();
+    bench
+}
+
+#[test]
+fn a_log_that_contradicts_the_model() {
+    let place = ["logged_closed.csv", "mode 1 (valve closed)", "level 1"];
+    let doubted =
+        |bench: &Bench, what: &str| one(&of_design(bench), &[&place[..], &[what]].concat());
+    assert_eq!(of_design(&logged(|_, level| level)), [""; 0]);
+    doubted(&logged(|_, level| -level), "differs from the model's");
+    doubted(
+        &logged(|_, level| 80.0 - level),
+        "sign seems to be reversed",
+    );
+    doubted(
+        &logged(|_, level| 1000.0 * level),
+        "differs from the model's",
+    );
+    doubted(&logged(|_, level| 40.0 + 1000.0 * (level - 40.0)), "unit");
+    let faulty = |row, level| level + if (200..300).contains(&row) { 5.0 } else { 0.0 };
+    doubted(&logged(faulty), "do not explain");
+
+    let swapped = logged(|_, level| level);
+    fs::copy(
+        swapped.path("logged_open.csv"),
+        swapped.path("logged_closed.csv"),
+    )
+    .unwrap();
+    let warnings = of_design(&swapped);
+    assert_eq!(warnings.len(), 2, "{warnings:?}");
+    assert!(
+        warnings
+            .iter()
+            .all(|w| w.contains("logged_closed.csv: mode 1"))
+    );
+}
+
+#[test]
+fn a_sensor_that_never_changes_is_refused() {
+    let run = logged(|_, _| 40.0).run(&["design", FILE]);
+    assert_eq!(run.code(), 2);
+    for word in [
+        "logged_closed.csv",
+        "mode 1 (valve closed)",
+        "level 1 never changes",
+    ] {
+        assert!(run.stderr().contains(word), "{}", run.stderr());
+    }
+}
+
+/// A voltage sensor that sticks makes a controller that believes it empty the DC link. It once went
+/// through zero and to hundreds of kilovolts; its diodes hold it up.
+#[test]
+fn a_link_that_is_emptied_rests_on_its_diodes() {
+    let example =
+        std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../../examples/converter.toml");
+    let text = fs::read_to_string(example).unwrap();
+    let (before, _) = text.split_once("[scenario]").unwrap();
+    let scenario = "[scenario]\nsteps = 2400\nnoise = [0.3, 0.05]\n\
+                    schedule = [{ from = 0, mode = 1 }, { from = 11.3, mode = 2 }]\n\
+                    reference = [{ kind = \"square\", amplitude = 10, period = 4, offset = 600 }, 0.0]\n\
+                    events = [{ kind = \"stuck\", sensor = 1, from = 5 }]\n";
+    let bench = Bench::new(format!("{before}{scenario}"));
+    let warnings = of_run(&bench, &["--baselines"]);
+    for variant in ["no_ftc", "mpc"] {
+        let word =
+            format!("{variant}: the DC link fell to where its diodes conduct, below 538.7 V");
+        assert!(
+            warnings.iter().any(|w| w.starts_with(&word)),
+            "{warnings:?}"
+        );
+    }
+    let mut table = csv::Reader::from_path(bench.path("out/trajectories.csv")).unwrap();
+    let header = table.headers().unwrap().clone();
+    let voltages: Vec<usize> = (0..header.len())
+        .filter(|&column| header[column].ends_with(".x[3]"))
+        .collect();
+    assert_eq!(voltages.len(), 5);
+    for record in table.records() {
+        let record = record.unwrap();
+        for &column in &voltages {
+            let voltage: f64 = record[column].parse().unwrap();
+            assert!(
+                (450.0..1000.0).contains(&voltage),
+                "{}: {voltage} V",
+                &header[column]
+            );
+        }
+    }
+}
+
+#[test]
+fn a_constant_reference_has_no_vaf() {
+    let constant = damaged("{ kind = \"square\", amplitude = 1, period = 20 }", "0.5");
+    let row = |design: &str, output: &str| -> Vec<String> {
+        let bench = Bench::new(design);
+        let text = bench.run(&["simulate", FILE, "--out", "out"]).stdout();
+        let line = text
+            .lines()
+            .find(|line| line.starts_with("ftc") && line.contains(output));
+        assert_eq!(
+            text.contains("VAF compares variances"),
+            design != SOUND,
+            "{text}"
+        );
+        line.unwrap().split_whitespace().map(String::from).collect()
+    };
+    assert_eq!(row(&constant, " b ")[4..], ["-", "-"]);
+    assert!(row(&constant, " a ")[4].parse::<f64>().is_ok());
+    assert!(row(SOUND, " b ")[4].parse::<f64>().is_ok());
+}

@@ -1,0 +1,743 @@
+//! From a design file to a request the method understands: sizes, indices, defaults, refusals.
+//!
+//! Every error is the end of a sentence that begins with the file's name.
+
+use crate::check;
+use crate::defaults;
+use crate::healthy_log::Logs;
+use crate::schema::{
+    self, CompensationMethod, DesignFile, EstimatorMethod, LyapunovKind, ObjectiveKind,
+    ObserverKind, PlantModel, SignalInfo,
+};
+use crate::signal::Signal as SignalOverTime;
+use crate::values::{NameOrList, NumberOrList};
+use ftc_control::parameters;
+use ftc_design::assembly::{DatabaseSource, EstimatorSpec, KnownDisturbance, Request, Threshold};
+use ftc_design::{ControlSpec, Lyapunov, Objective, ObserverSpec, Signal, Signals};
+use ftc_plant::rows;
+use ftc_plant::scenario::{ModeInterval, Waveform};
+use ftc_plant::{Dimensions, Mode, OperatingPoint, SwitchedPlant};
+use ftc_plant::{Scenario, Truth};
+use nalgebra::DMatrix;
+use std::path::Path;
+
+/// The largest number of states, inputs, outputs, disturbances or modes.
+const LARGEST_SIZE: usize = 64;
+/// The most samples of a scenario.
+const MOST_STEPS: usize = 1_000_000;
+/// The longest debounce in samples, and the most repetitions of a reading.
+const LONGEST_DEBOUNCE: usize = 10_000;
+/// The most harmonics of a disturbance.
+const MOST_HARMONICS: usize = 50;
+
+/// Checks a design file and turns it into a request; CSV tables are sought in `folder`.
+///
+/// # Errors
+/// One sentence that names the key and what to do.
+pub fn request(file: &DesignFile, folder: &Path) -> Result<Request, String> {
+    at("name", check::identifier(&file.name))?;
+    let plant = plant(file)?;
+    let dims = Dimensions::check(&plant)?;
+    bearable(&plant, dims)?;
+    let signals = signals(&file.signals, &plant, dims)?;
+    let disturbance = disturbance(file, dims)?;
+    let control = ControlSpec {
+        resonators: resonators(file, disturbance.as_ref())?,
+        ..control(&file.controller, &signals, dims)?
+    };
+    let observer = observer(&file.observer, &control)?;
+    let logs = Logs {
+        plant: &plant,
+        signals: &signals,
+        folder,
+    };
+    let estimator = estimator(&file.estimator, disturbance, dims, &logs)?;
+    let scenario = Play {
+        scenario: &file.scenario,
+        known: estimator.disturbance.as_ref(),
+        tracked: &control.tracked,
+        signals: &signals,
+        plant: &plant,
+        dims,
+        folder,
+    }
+    .resolve()?;
+    Ok(Request {
+        name: file.name.clone(),
+        signals,
+        plant,
+        truth: truth(file),
+        control,
+        bumpless: file.controller.bumpless.unwrap_or(defaults::BUMPLESS),
+        feedforward: file.controller.feedforward.unwrap_or(defaults::FEEDFORWARD),
+        observer,
+        estimator,
+        compensation: compensation(file),
+        scenario,
+    })
+}
+
+/// Puts the key before a complaint.
+fn at<T>(key: &str, result: Result<T, String>) -> Result<T, String> {
+    result.map_err(|what| format!("{key} {what}"))
+}
+
+/// What is simulated: the modes themselves, or the named model they are linearised from.
+fn truth(file: &DesignFile) -> Truth {
+    match &file.plant {
+        None => Truth::AsDesigned,
+        Some(PlantModel::Rectifier(rectifier)) => Truth::Rectifier(rectifier.clone()),
+    }
+}
+
+/// The modes of a named model: its linearisations.
+fn linearised(model: &PlantModel, sample_time: f64) -> Result<SwitchedPlant, String> {
+    let PlantModel::Rectifier(rectifier) = model;
+    let values = [
+        ("inductance", rectifier.inductance),
+        ("resistance", rectifier.resistance),
+        ("capacitance", rectifier.capacitance),
+        ("phase_voltage", rectifier.phase_voltage),
+        ("current_loop", rectifier.current_loop),
+        ("dc_voltage", rectifier.dc_voltage),
+    ];
+    for (key, value) in values {
+        at(&format!("plant.{key}"), check::positive(value))?;
+    }
+    at(
+        "plant.loads",
+        check::each(&rectifier.loads, check::positive),
+    )?;
+    if rectifier.loads.is_empty() || rectifier.loads.len() > LARGEST_SIZE {
+        return Err(format!(
+            "plant.loads has {} entries: give 1 to {LARGEST_SIZE}, one per mode",
+            rectifier.loads.len()
+        ));
+    }
+    at("plant:", rectifier.linearise(sample_time))
+}
+
+fn plant(file: &DesignFile) -> Result<SwitchedPlant, String> {
+    at("sample_time", check::positive(file.sample_time))?;
+    match (&file.plant, file.modes.is_empty()) {
+        (Some(model), true) => return linearised(model, file.sample_time),
+        (Some(_), false) => {
+            return Err(
+                "[plant] and [[mode]] exclude each other: a named model brings its own modes"
+                    .into(),
+            );
+        }
+        (None, true) => {
+            return Err(
+                "mode is missing: add at least one [[mode]], or a [plant] with a model".into(),
+            );
+        }
+        (None, false) => {}
+    }
+    if file.modes.len() > LARGEST_SIZE {
+        return Err(format!(
+            "mode: there are {} modes: give at most {LARGEST_SIZE}",
+            file.modes.len()
+        ));
+    }
+    let width = |rows: &Option<Vec<Vec<f64>>>| rows.as_ref()?.first().map(Vec::len);
+    let disturbances = file
+        .modes
+        .iter()
+        .find_map(|mode| width(&mode.e).or(width(&mode.f)))
+        .unwrap_or(0);
+    let modes: Result<Vec<Mode>, String> = file
+        .modes
+        .iter()
+        .enumerate()
+        .map(|(index, given)| {
+            mode(given, index + 1, disturbances)
+                .map_err(|what| format!("mode {}: {what}", index + 1))
+        })
+        .collect();
+    Ok(SwitchedPlant {
+        sample_time: file.sample_time,
+        modes: modes?,
+    })
+}
+
+fn mode(given: &schema::Mode, number: usize, disturbances: usize) -> Result<Mode, String> {
+    let a = matrix("A", &given.a)?;
+    let b = matrix("B", &given.b)?;
+    let c = matrix("C", &given.c)?;
+    let (n, p) = (a.nrows(), c.nrows());
+    let channel = |name: &str, rows: &Option<Vec<Vec<f64>>>, height: usize| match rows {
+        Some(rows) => matrix(name, rows),
+        None => Ok(DMatrix::zeros(height, disturbances)),
+    };
+    let operating_point = match &given.operating_point {
+        Some(point) => OperatingPoint {
+            x: point.x.clone(),
+            u: point.u.clone(),
+            y: point.y.clone(),
+        },
+        None => OperatingPoint::zero(n, b.ncols(), p),
+    };
+    Ok(Mode {
+        name: given.name.clone().unwrap_or(format!("mode {number}")),
+        e: channel("E", &given.e, n)?,
+        f: channel("F", &given.f, p)?,
+        a,
+        b,
+        c,
+        operating_point,
+    })
+}
+
+fn matrix(name: &str, given: &[Vec<f64>]) -> Result<DMatrix<f64>, String> {
+    let matrix = rows::from_rows(given)
+        .map_err(|what| format!("{name}: {what}: make all rows equally long"))?;
+    match matrix
+        .iter()
+        .position(|&value| check::number(value).is_err())
+    {
+        Some(entry) => Err(format!(
+            "{name}: the entry in row {}, column {} {}",
+            entry % matrix.nrows() + 1,
+            entry / matrix.nrows() + 1,
+            check::number(matrix[entry]).err().unwrap_or_default()
+        )),
+        None => Ok(matrix),
+    }
+}
+
+/// Refuses what no solver could finish.
+fn bearable(plant: &SwitchedPlant, dims: Dimensions) -> Result<(), String> {
+    let sizes = [
+        ("states (rows of A)", dims.states),
+        ("inputs (columns of B)", dims.inputs),
+        ("outputs (rows of C)", dims.outputs),
+        ("disturbances (columns of E and F)", dims.disturbances),
+    ];
+    if let Some((what, size)) = sizes.iter().find(|(_, size)| *size > LARGEST_SIZE) {
+        return Err(format!(
+            "mode 1: there are {size} {what}: reduce the model to at most {LARGEST_SIZE}"
+        ));
+    }
+    for (index, mode) in plant.modes.iter().enumerate() {
+        let point = &mode.operating_point;
+        for (name, values) in [("x", &point.x), ("u", &point.u), ("y", &point.y)] {
+            at(
+                &format!("mode {}: operating_point.{name}", index + 1),
+                check::each(values, check::number),
+            )?;
+        }
+    }
+    Ok(())
+}
+
+fn signals(
+    given: &schema::Signals,
+    plant: &SwitchedPlant,
+    dims: Dimensions,
+) -> Result<Signals, String> {
+    let points = |pick: fn(&OperatingPoint) -> &Vec<f64>| -> Vec<&[f64]> {
+        let modes = plant.modes.iter();
+        modes.map(|m| pick(&m.operating_point).as_slice()).collect()
+    };
+    let inputs = channels("inputs", "u", &given.inputs, dims.inputs, &points(|p| &p.u))?;
+    let outputs = channels(
+        "outputs",
+        "y",
+        &given.outputs,
+        dims.outputs,
+        &points(|p| &p.y),
+    )?;
+    let states = channels("states", "x", &given.states, dims.states, &points(|p| &p.x))?;
+    Ok(Signals {
+        inputs,
+        outputs,
+        states,
+    })
+}
+
+fn channels(
+    key: &str,
+    letter: &str,
+    given: &Option<Vec<SignalInfo>>,
+    size: usize,
+    points: &[&[f64]],
+) -> Result<Vec<Signal>, String> {
+    let unnamed = vec![SignalInfo::default(); size];
+    let given = given.as_ref().unwrap_or(&unnamed);
+    if given.len() != size {
+        return Err(format!(
+            "signals.{key} has {} entries: the plant needs {size}",
+            given.len()
+        ));
+    }
+    let signals: Result<Vec<Signal>, String> = given
+        .iter()
+        .enumerate()
+        .map(|(index, info)| {
+            let largest = points.iter().map(|point| point[index].abs());
+            let name = format!("{letter}[{}]", index + 1);
+            signal(info, name, largest.fold(0.0, f64::max))
+                .map_err(|what| format!("signals.{key}[{}].{what}", index + 1))
+        })
+        .collect();
+    let signals = signals?;
+    for (index, signal) in signals.iter().enumerate() {
+        if signals[..index]
+            .iter()
+            .any(|other| other.name == signal.name)
+        {
+            return Err(format!(
+                "signals.{key}[{}].name \"{}\" is used twice: give each signal its own",
+                index + 1,
+                signal.name
+            ));
+        }
+    }
+    Ok(signals)
+}
+
+/// One signal; `operating` is its largest magnitude among the operating points.
+fn signal(info: &SignalInfo, default_name: String, operating: f64) -> Result<Signal, String> {
+    let SignalInfo { min, max, .. } = *info;
+    for (key, bound) in [("min", min), ("max", max)] {
+        at(key, bound.map_or(Ok(()), check::number))?;
+    }
+    if let (Some(min), Some(max)) = (min, max)
+        && min >= max
+    {
+        return Err(format!("min is {min}, max is {max}: give a min below max"));
+    }
+    at("nominal", info.nominal.map_or(Ok(()), check::positive))?;
+    let range = min.zip(max).map(|(min, max)| (max - min) / 2.0);
+    let operating = (operating > 0.0).then_some(operating);
+    let name = info.name.clone().unwrap_or(default_name);
+    if name.trim().is_empty() || name.chars().any(char::is_control) {
+        return Err("name is empty or not printable: give a name, or leave the key out".into());
+    }
+    Ok(Signal {
+        name,
+        unit: info.unit.clone().filter(|unit| !unit.trim().is_empty()),
+        nominal: info.nominal.or(operating).or(range).unwrap_or(1.0),
+        min,
+        max,
+    })
+}
+
+fn control(
+    given: &schema::Controller,
+    signals: &Signals,
+    dims: Dimensions,
+) -> Result<ControlSpec, String> {
+    let tracked = tracked(given, dims)?;
+    let latency = given.latency.map_or(Ok(defaults::LATENCY), |latency| {
+        at("controller.latency", check::count(latency, 0, 1))
+    })?;
+    let decay = given.decay.unwrap_or(defaults::DECAY);
+    at("controller.decay", check::decay(decay))?;
+    let outputs: Vec<f64> = tracked
+        .iter()
+        .map(|&o| signals.outputs[o].nominal)
+        .collect();
+    let inputs: Vec<f64> = signals.inputs.iter().map(|input| input.nominal).collect();
+    let output_weight = weight(
+        "output_weight",
+        &given.output_weight,
+        defaults::OUTPUT_WEIGHT,
+        &outputs,
+    )?;
+    let integral_weight = weight(
+        "integral_weight",
+        &given.integral_weight,
+        defaults::INTEGRAL_WEIGHT,
+        &outputs,
+    )?;
+    let input_weight = weight(
+        "input_weight",
+        &given.input_weight,
+        defaults::INPUT_WEIGHT,
+        &inputs,
+    )?;
+    Ok(ControlSpec {
+        tracked,
+        latency,
+        lyapunov: lyapunov(given.lyapunov.unwrap_or(defaults::LYAPUNOV)),
+        decay,
+        objective: match given.objective.unwrap_or(defaults::OBJECTIVE) {
+            ObjectiveKind::Attenuation => Objective::Attenuation,
+            ObjectiveKind::Decay => Objective::Decay,
+        },
+        resonators: Vec::new(),
+        output_weight,
+        integral_weight,
+        input_weight,
+    })
+}
+
+/// The angles of the internal model's resonators; none where no internal model is wanted.
+fn resonators(
+    file: &DesignFile,
+    disturbance: Option<&KnownDisturbance>,
+) -> Result<Vec<f64>, String> {
+    let wanted = file.controller.internal_model;
+    match (wanted.unwrap_or(defaults::INTERNAL_MODEL), disturbance) {
+        (false, _) => Ok(Vec::new()),
+        (true, Some(known)) => Ok(known.angles(file.sample_time)),
+        (true, None) => Err(
+            "controller.internal_model = true needs to know the disturbance: give [disturbance] with its period"
+                .into(),
+        ),
+    }
+}
+
+fn lyapunov(kind: LyapunovKind) -> Lyapunov {
+    match kind {
+        LyapunovKind::Common => Lyapunov::Common,
+        LyapunovKind::Switched => Lyapunov::Switched,
+        LyapunovKind::Dwell => Lyapunov::Dwell,
+    }
+}
+
+fn tracked(given: &schema::Controller, dims: Dimensions) -> Result<Vec<usize>, String> {
+    let Some(numbers) = &given.tracked else {
+        return Ok((0..dims.outputs.min(dims.inputs)).collect());
+    };
+    if numbers.is_empty() {
+        return Err("controller.tracked is empty: name at least one output, counted from 1".into());
+    }
+    let mut tracked = Vec::new();
+    for &number in numbers {
+        let output = check::index("controller.tracked:", number, dims.outputs, "outputs")
+            .map_err(|what| what.replace(": is", " contains a number that is"))?;
+        if tracked.contains(&output) {
+            return Err(format!(
+                "controller.tracked names output {number} twice: name each output once"
+            ));
+        }
+        tracked.push(output);
+    }
+    if tracked.len() > dims.inputs {
+        return Err(format!(
+            "controller.tracked names {} outputs, but the plant has {} inputs: track at most as many outputs as there are inputs",
+            tracked.len(),
+            dims.inputs
+        ));
+    }
+    Ok(tracked)
+}
+
+/// The weight of each channel; by default relative to the nominal values.
+fn weight(
+    key: &str,
+    given: &Option<NumberOrList>,
+    default: f64,
+    nominal: &[f64],
+) -> Result<Vec<f64>, String> {
+    let key = format!("controller.{key}");
+    let Some(given) = given else {
+        return Ok(nominal.iter().map(|value| default / value).collect());
+    };
+    let weights = at(&key, given.spread(nominal.len()))?;
+    at(&key, check::each(&weights, check::not_negative))?;
+    Ok(weights)
+}
+
+fn observer(given: &schema::Observer, control: &ControlSpec) -> Result<ObserverSpec, String> {
+    use ftc_design::ObserverChoice as Kind;
+    let decay = given.decay.unwrap_or(control.decay);
+    at("observer.decay", check::decay(decay))?;
+    Ok(ObserverSpec {
+        kind: match given.kind.unwrap_or(defaults::OBSERVER) {
+            ObserverKind::Uio => Kind::Uio,
+            ObserverKind::Luenberger => Kind::Luenberger,
+            ObserverKind::Auto => Kind::Auto,
+        },
+        decay,
+        lyapunov: control.lyapunov,
+    })
+}
+
+fn disturbance(file: &DesignFile, dims: Dimensions) -> Result<Option<KnownDisturbance>, String> {
+    let Some(given) = &file.disturbance else {
+        return Ok(None);
+    };
+    at("disturbance.period", check::positive(given.period))?;
+    let shortest = 2.0 * file.sample_time;
+    let harmonics = match given.harmonics {
+        None => defaults::HARMONICS,
+        Some(count) => {
+            let count = i64::try_from(count).unwrap_or(i64::MAX);
+            at(
+                "disturbance.harmonics",
+                check::count(count, 1, MOST_HARMONICS),
+            )?
+        }
+    };
+    if given.period / harmonics as f64 <= shortest {
+        return Err(format!(
+            "disturbance.period is {}: {harmonics} harmonics of it need a period above {} seconds at this sample_time",
+            given.period,
+            shortest * harmonics as f64
+        ));
+    }
+    let amplitude = match &given.amplitude {
+        None => None,
+        Some(amplitude) => {
+            let values = at("disturbance.amplitude", amplitude.spread(dims.disturbances))?;
+            at(
+                "disturbance.amplitude",
+                check::each(&values, check::not_negative),
+            )?;
+            Some(values)
+        }
+    };
+    Ok(Some(KnownDisturbance {
+        period: given.period,
+        harmonics,
+        amplitude,
+    }))
+}
+
+fn estimator(
+    given: &schema::Estimator,
+    disturbance: Option<KnownDisturbance>,
+    dims: Dimensions,
+    logs: &Logs,
+) -> Result<EstimatorSpec, String> {
+    let method = match given.method.unwrap_or(defaults::ESTIMATOR) {
+        EstimatorMethod::Reference => parameters::EstimatorMethod::Reference,
+        EstimatorMethod::Sliding => parameters::EstimatorMethod::Sliding,
+        EstimatorMethod::None => parameters::EstimatorMethod::None,
+    };
+    let response_length = match given.response_length {
+        None => None,
+        Some(length) => Some(at(
+            "estimator.response_length",
+            check::count(length, 1, ftc_design::commissioning::LONGEST_RESPONSE),
+        )?),
+    };
+    let debounce = match given.debounce {
+        None => defaults::DEBOUNCE,
+        Some(samples) => at(
+            "estimator.debounce",
+            check::count(samples, 1, LONGEST_DEBOUNCE),
+        )? as u32,
+    };
+    let stuck_after = match given.stuck_after {
+        None => defaults::STUCK_AFTER,
+        Some(samples) => at(
+            "estimator.stuck_after",
+            check::count(samples, 0, LONGEST_DEBOUNCE),
+        )? as u32,
+    };
+    Ok(EstimatorSpec {
+        method,
+        response_length,
+        database: database(given, logs)?,
+        threshold: threshold(given, dims)?,
+        debounce,
+        stuck_after,
+        adapt: given.adapt.unwrap_or(defaults::ADAPT),
+        disturbance,
+    })
+}
+
+fn database(given: &schema::Estimator, logs: &Logs) -> Result<DatabaseSource, String> {
+    let is_log = |name: &str| name.to_lowercase().ends_with(".csv");
+    let files = match &given.database {
+        None => return Ok(defaults::DATABASE),
+        Some(NameOrList::Name(name)) if name == "commission" => {
+            return Ok(DatabaseSource::Commission);
+        }
+        Some(NameOrList::Name(name)) if name == "model" => return Ok(DatabaseSource::Model),
+        Some(NameOrList::Name(name)) if !is_log(name) => {
+            return Err(format!(
+                "estimator.database = \"{}\" is not a known value and no CSV file: {}",
+                crate::sentence::shorten(name),
+                crate::suggest::nearest(name, &["commission", "model"])
+            ));
+        }
+        Some(files) => files,
+    };
+    if let NameOrList::List(names) = files
+        && let Some(name) = names.iter().find(|name| !is_log(name))
+    {
+        return Err(format!(
+            "estimator.database lists \"{}\": list CSV files only, one per mode",
+            crate::sentence::shorten(name)
+        ));
+    }
+    if !matches!(given.method, None | Some(EstimatorMethod::Reference)) {
+        return Err(
+            "estimator.database names a log, which only method = \"reference\" uses: change one of them"
+                .into(),
+        );
+    }
+    at("estimator.database", logs.read(files)).map(DatabaseSource::Recorded)
+}
+
+fn threshold(given: &schema::Estimator, dims: Dimensions) -> Result<Threshold, String> {
+    match (&given.threshold, given.sigmas) {
+        (Some(_), Some(_)) => Err(
+            "estimator.threshold and estimator.sigmas exclude each other: give one of them".into(),
+        ),
+        (Some(threshold), None) => {
+            let values = at("estimator.threshold", threshold.spread(dims.outputs))?;
+            at("estimator.threshold", check::each(&values, check::positive))?;
+            Ok(Threshold::Given(values))
+        }
+        (None, sigmas) => {
+            let sigmas = sigmas.unwrap_or(defaults::SIGMAS);
+            at("estimator.sigmas", check::positive(sigmas))?;
+            Ok(Threshold::Sigmas(sigmas))
+        }
+    }
+}
+
+fn compensation(file: &DesignFile) -> parameters::Compensation {
+    match file.compensation.method.unwrap_or(defaults::COMPENSATION) {
+        CompensationMethod::VirtualSensor => parameters::Compensation::VirtualSensor,
+        CompensationMethod::Additive => parameters::Compensation::Additive,
+        CompensationMethod::None => parameters::Compensation::None,
+    }
+}
+
+/// Everything the scenario depends on.
+struct Play<'a> {
+    scenario: &'a schema::Scenario,
+    known: Option<&'a KnownDisturbance>,
+    tracked: &'a [usize],
+    signals: &'a Signals,
+    plant: &'a SwitchedPlant,
+    dims: Dimensions,
+    folder: &'a Path,
+}
+
+impl Play<'_> {
+    fn resolve(&self) -> Result<Scenario, String> {
+        let given = self.scenario;
+        let steps = given.steps.map_or(Ok(defaults::STEPS), |steps| {
+            at("scenario.steps", check::count(steps, 1, MOST_STEPS)).map(|steps| steps as u64)
+        })?;
+        let seed = given.seed.map_or(Ok(defaults::SEED), |seed| {
+            u64::try_from(seed)
+                .map_err(|_| format!("scenario.seed is {seed}: give a whole number, 0 or more"))
+        })?;
+        let (outputs, disturbances) = (self.dims.outputs, self.dims.disturbances);
+        let schedule = self.schedule()?;
+        let first = schedule[0].mode;
+        Ok(Scenario {
+            steps,
+            noise: self.noise()?,
+            seed,
+            reference: self.channels("reference", &given.reference, self.tracked.len(), |at| {
+                self.step(at, first, steps)
+            })?,
+            fault: self.channels("fault", &given.fault, outputs, |_| Waveform::ZERO)?,
+            disturbance: self.channels("disturbance", &given.disturbance, disturbances, |at| {
+                self.expected_disturbance(at)
+            })?,
+            events: self.events()?,
+            schedule,
+        })
+    }
+
+    fn noise(&self) -> Result<Vec<f64>, String> {
+        let outputs = self.dims.outputs;
+        let Some(given) = &self.scenario.noise else {
+            return Ok(vec![0.0; outputs]);
+        };
+        let noise = at("scenario.noise", given.spread(outputs))?;
+        at("scenario.noise", check::each(&noise, check::not_negative))?;
+        Ok(noise)
+    }
+
+    fn schedule(&self) -> Result<Vec<ModeInterval>, String> {
+        let whole = [schema::ModeInterval { from: 0.0, mode: 1 }];
+        let given = self.scenario.schedule.as_deref().unwrap_or(&whole);
+        if given.first().is_none_or(|interval| interval.from != 0.0) {
+            return Err(
+                "scenario.schedule must start at time 0: let its first entry say from = 0".into(),
+            );
+        }
+        let ascending =
+            |pair: &[schema::ModeInterval]| pair[0].from < pair[1].from && pair[1].from.is_finite();
+        if let Some(pair) = given.windows(2).find(|pair| !ascending(pair)) {
+            return Err(format!(
+                "scenario.schedule goes from time {} to {}: give the times in ascending order",
+                pair[0].from, pair[1].from
+            ));
+        }
+        let total = self.plant.modes.len();
+        let resolve = |(entry, interval): (usize, &schema::ModeInterval)| {
+            let what = format!("scenario.schedule[{}].mode", entry + 1);
+            let mode = check::index(&what, interval.mode, total, "modes")?;
+            Ok(ModeInterval {
+                from: interval.from,
+                mode,
+            })
+        };
+        given.iter().enumerate().map(resolve).collect()
+    }
+
+    fn channels(
+        &self,
+        key: &str,
+        given: &Option<Vec<SignalOverTime>>,
+        size: usize,
+        default: impl Fn(usize) -> Waveform,
+    ) -> Result<Vec<Waveform>, String> {
+        let Some(given) = given else {
+            return Ok((0..size).map(default).collect());
+        };
+        if given.len() != size {
+            return Err(format!(
+                "scenario.{key} has {} signals: give {size}, one per channel",
+                given.len()
+            ));
+        }
+        let waveform = |(index, signal): (usize, &SignalOverTime)| {
+            signal
+                .waveform(self.folder)
+                .map_err(|what| format!("scenario.{key}[{}]: {what}", index + 1))
+        };
+        given.iter().enumerate().map(waveform).collect()
+    }
+
+    fn events(&self) -> Result<Vec<ftc_plant::scenario::FaultEvent>, String> {
+        let events = self.scenario.events.iter().flatten().enumerate();
+        events
+            .map(|(index, event)| {
+                event
+                    .fault(self.dims.outputs)
+                    .map_err(|what| format!("scenario.events[{}]: {what}", index + 1))
+            })
+            .collect()
+    }
+
+    /// A step of a tracked output from its operating point in the first mode.
+    fn step(&self, tracked: usize, first_mode: usize, steps: u64) -> Waveform {
+        let output = self.tracked[tracked];
+        let start = self.plant.modes[first_mode].operating_point.y[output];
+        let nominal = self.signals.outputs[output].nominal;
+        let height = if nominal == 1.0 { 1.0 } else { nominal / 5.0 };
+        let time = (steps / 10).max(1) as f64 * self.plant.sample_time;
+        Waveform::Steps {
+            points: vec![[0.0, start], [time, start + height]],
+        }
+    }
+
+    /// A sine of the known period and amplitude.
+    fn expected_disturbance(&self, channel: usize) -> Waveform {
+        let sine = self.known.and_then(|known| {
+            let amplitude = *known.amplitude.as_ref()?.get(channel)?;
+            Some(Waveform::Sine {
+                amplitude,
+                period: known.period,
+                phase: 0.0,
+                offset: 0.0,
+            })
+        });
+        sine.unwrap_or(Waveform::ZERO)
+    }
+}

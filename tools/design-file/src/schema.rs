@@ -1,0 +1,288 @@
+//! The keys of a design file, table by table, as the user writes them.
+//!
+//! A key exists exactly when a field here has its name: what is unknown is refused, and the
+//! nearest known key is found from these structs. What an absent key means is written down in
+//! [`crate::defaults`]; what a value must satisfy, in [`crate::check`].
+
+use crate::signal::{Event, Signal};
+use crate::values::{NameOrList, NumberOrList};
+use ftc_plant::rectifier::Rectifier;
+use serde::Deserialize;
+
+/// A whole design file.
+#[derive(Clone, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct DesignFile {
+    /// Name of the design: a C identifier, it names files and FMUs.
+    pub name: String,
+    /// `Te` in seconds.
+    pub sample_time: f64,
+    /// The modes of the plant, `[[mode]]`; none where the plant has a model with a name.
+    #[serde(rename = "mode", default)]
+    pub modes: Vec<Mode>,
+    /// A nonlinear plant with a name, in place of the modes.
+    pub plant: Option<PlantModel>,
+    /// What the signals are called and measured in.
+    #[serde(default)]
+    pub signals: Signals,
+    /// What is known of the periodic disturbance.
+    pub disturbance: Option<Disturbance>,
+    /// The state feedback that is asked for.
+    #[serde(default)]
+    pub controller: Controller,
+    /// The observer that is asked for.
+    #[serde(default)]
+    pub observer: Observer,
+    /// The fault estimator that is asked for.
+    #[serde(default)]
+    pub estimator: Estimator,
+    /// What is done about an estimated fault.
+    #[serde(default)]
+    pub compensation: Compensation,
+    /// The experiment.
+    #[serde(default)]
+    pub scenario: Scenario,
+}
+
+/// `[plant]`: what is simulated, and linearised for the design.
+#[derive(Clone, Debug, Deserialize)]
+#[serde(tag = "model", rename_all = "kebab-case")]
+pub enum PlantModel {
+    /// The averaged three-phase rectifier; one mode per load.
+    Rectifier(Rectifier),
+}
+
+/// One `[[mode]]`; matrices are lists of rows.
+#[derive(Clone, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Mode {
+    /// What the user calls it.
+    pub name: Option<String>,
+    /// State matrix (n x n).
+    #[serde(rename = "A")]
+    pub a: Vec<Vec<f64>>,
+    /// Input matrix (n x m).
+    #[serde(rename = "B")]
+    pub b: Vec<Vec<f64>>,
+    /// Output matrix (p x n).
+    #[serde(rename = "C")]
+    pub c: Vec<Vec<f64>>,
+    /// Disturbance to state (n x s).
+    #[serde(rename = "E")]
+    pub e: Option<Vec<Vec<f64>>>,
+    /// Disturbance to output (p x s).
+    #[serde(rename = "F")]
+    pub f: Option<Vec<Vec<f64>>>,
+    /// The steady state around which the mode is linear.
+    pub operating_point: Option<OperatingPoint>,
+}
+
+/// A steady state of one mode.
+#[derive(Clone, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct OperatingPoint {
+    /// State (n).
+    pub x: Vec<f64>,
+    /// Input (m).
+    pub u: Vec<f64>,
+    /// Output (p).
+    pub y: Vec<f64>,
+}
+
+/// `[signals]`.
+#[derive(Clone, Debug, Default, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Signals {
+    /// Inputs (m).
+    pub inputs: Option<Vec<SignalInfo>>,
+    /// Outputs (p).
+    pub outputs: Option<Vec<SignalInfo>>,
+    /// States (n).
+    pub states: Option<Vec<SignalInfo>>,
+}
+
+/// What is known of one signal.
+#[derive(Clone, Debug, Default, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct SignalInfo {
+    /// Name.
+    pub name: Option<String>,
+    /// Unit.
+    pub unit: Option<String>,
+    /// Typical magnitude of a change.
+    pub nominal: Option<f64>,
+    /// Smallest value.
+    pub min: Option<f64>,
+    /// Largest value.
+    pub max: Option<f64>,
+}
+
+/// `[disturbance]`.
+#[derive(Clone, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Disturbance {
+    /// Period in seconds.
+    pub period: f64,
+    /// Number of harmonics, the fundamental included.
+    pub harmonics: Option<usize>,
+    /// Largest value of each disturbance (number or s).
+    pub amplitude: Option<NumberOrList>,
+}
+
+/// `[controller]`.
+#[derive(Clone, Debug, Default, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Controller {
+    /// Numbers of the outputs that follow a reference, from 1.
+    pub tracked: Option<Vec<i64>>,
+    /// Samples between a measurement and the first effect of its command.
+    pub latency: Option<i64>,
+    /// Which guarantee of stability under switching.
+    pub lyapunov: Option<LyapunovKind>,
+    /// What the gains are chosen for.
+    pub objective: Option<ObjectiveKind>,
+    /// Decay rate per sample.
+    pub decay: Option<f64>,
+    /// Weight of each tracked output (number or r).
+    pub output_weight: Option<NumberOrList>,
+    /// Weight of each tracking-error integral (number or r).
+    pub integral_weight: Option<NumberOrList>,
+    /// Weight of each input (number or m).
+    pub input_weight: Option<NumberOrList>,
+    /// No jump of the command at a mode switch.
+    pub bumpless: Option<bool>,
+    /// The reference acts on the command at once.
+    pub feedforward: Option<bool>,
+    /// Asymptotic rejection of the periodic disturbance.
+    pub internal_model: Option<bool>,
+}
+
+/// Values of `controller.lyapunov`.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum LyapunovKind {
+    /// One Lyapunov function for all modes.
+    Common,
+    /// One per mode, every switch proved.
+    Switched,
+    /// One per mode, modes must last.
+    Dwell,
+}
+
+/// Values of `controller.objective`.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum ObjectiveKind {
+    /// Least gain from the disturbance to the performance signal (T2).
+    Attenuation,
+    /// Stability with the decay rate only (T1).
+    Decay,
+}
+
+/// `[observer]`.
+#[derive(Clone, Debug, Default, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Observer {
+    /// Which observer.
+    pub kind: Option<ObserverKind>,
+    /// Decay rate of the estimation error per sample.
+    pub decay: Option<f64>,
+}
+
+/// Values of `observer.kind`.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum ObserverKind {
+    /// Unknown input observer.
+    Uio,
+    /// Luenberger observer.
+    Luenberger,
+    /// The first where it exists, else the second.
+    Auto,
+}
+
+/// `[estimator]`.
+#[derive(Clone, Debug, Default, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Estimator {
+    /// How faults are estimated.
+    pub method: Option<EstimatorMethod>,
+    /// Past inputs the output remembers, in samples.
+    pub response_length: Option<i64>,
+    /// `commission`, `model`, the name of a CSV file, or a list of one per mode.
+    pub database: Option<NameOrList>,
+    /// Residual that flags a fault, per sensor (number or p).
+    pub threshold: Option<NumberOrList>,
+    /// The same in standard deviations of the healthy residual.
+    pub sigmas: Option<f64>,
+    /// Consecutive samples that raise or release a fault.
+    pub debounce: Option<i64>,
+    /// Repetitions of one reading after which a sensor is taken for frozen.
+    pub stuck_after: Option<i64>,
+    /// Whether the response goes on being learned while all is well.
+    pub adapt: Option<bool>,
+}
+
+/// Values of `estimator.method`.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum EstimatorMethod {
+    /// Predictor from a healthy database.
+    Reference,
+    /// Sliding window as printed in the paper.
+    Sliding,
+    /// No estimation.
+    None,
+}
+
+/// `[compensation]`.
+#[derive(Clone, Debug, Default, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Compensation {
+    /// How an estimated fault is taken out of the loop.
+    pub method: Option<CompensationMethod>,
+}
+
+/// Values of `compensation.method`.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum CompensationMethod {
+    /// Observer and integrator see the corrected measurement.
+    VirtualSensor,
+    /// The additive control as printed in the paper.
+    Additive,
+    /// The estimate is reported, not used.
+    None,
+}
+
+/// `[scenario]`.
+#[derive(Clone, Debug, Default, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Scenario {
+    /// Number of samples.
+    pub steps: Option<i64>,
+    /// Standard deviation of the measurement noise (number or p).
+    pub noise: Option<NumberOrList>,
+    /// Seed of the noise.
+    pub seed: Option<i64>,
+    /// Which mode is active from when on.
+    pub schedule: Option<Vec<ModeInterval>>,
+    /// Reference of each tracked output (r).
+    pub reference: Option<Vec<Signal>>,
+    /// Additive fault of each sensor (p).
+    pub fault: Option<Vec<Signal>>,
+    /// Disturbance of each channel (s).
+    pub disturbance: Option<Vec<Signal>>,
+    /// Faults that are more than an addition.
+    pub events: Option<Vec<Event>>,
+}
+
+/// A mode (from 1) and the time in seconds from which it is active.
+#[derive(Clone, Copy, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct ModeInterval {
+    /// Seconds.
+    pub from: f64,
+    /// Number of the mode, from 1.
+    pub mode: i64,
+}

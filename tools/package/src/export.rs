@@ -1,0 +1,335 @@
+//! `export`: zips prebuilt generic binaries with the design as their resource. Nothing is compiled.
+
+use crate::Error;
+use crate::archive::{self, Contents};
+use crate::certificate::{self, Certificate};
+use crate::output::Staging;
+use crate::platform::{PLATFORMS, Platform};
+use crate::ssp::{self, Component, System};
+use ftc_design::Design;
+use ftc_simulate::Trajectory;
+use model_description::xml::{self, Document};
+use model_description::{CONTROLLER, Interface, PLANT, VariableTable};
+use report::documentation;
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::time::SystemTime;
+
+/// One of the two FMUs.
+pub(crate) struct Kind {
+    /// Ends the FMU's name.
+    suffix: &'static str,
+    /// Name of the generic binary, and the fingerprint's identifier.
+    pub binary: &'static str,
+    /// One line for the description.
+    description: &'static str,
+    table: fn(&Interface) -> VariableTable,
+}
+
+/// Both FMUs of a design.
+pub(crate) const KINDS: [Kind; 2] = [
+    Kind {
+        suffix: "controller",
+        binary: CONTROLLER,
+        description: "Sensor-fault-tolerant controller of a switched plant",
+        table: model_description::controller,
+    },
+    Kind {
+        suffix: "plant",
+        binary: PLANT,
+        description: "Switched plant with its scenario: reference, modes, sensor faults, disturbance, noise",
+        table: model_description::plant,
+    },
+];
+
+/// The platform of this machine.
+const HOST: &str = if cfg!(target_os = "windows") {
+    "win64"
+} else if cfg!(target_arch = "aarch64") {
+    "aarch64-linux"
+} else {
+    "linux64"
+};
+
+const LICENSES: &str = include_str!("../assets/licenses.txt");
+
+/// What every FMU shows in a browser of models.
+const ICON: &[u8] = include_bytes!("../assets/model.png");
+
+/// What an export needs of the design and of the machine.
+struct Exporter<'a> {
+    design: &'a Design,
+    /// The design as the binaries read it.
+    resource: Vec<u8>,
+    /// The proof, as `verify` reads it.
+    certificate: Vec<u8>,
+    interface: Interface,
+    /// The experiment, for the documentation's figures.
+    runs: Vec<Trajectory>,
+    binaries: Vec<Binaries>,
+}
+
+/// What to write, and from what.
+#[derive(Clone, Debug)]
+pub struct Options {
+    /// Directory to write to; made if it does not exist.
+    pub out: PathBuf,
+    /// Directory of the generic binaries: those that cargo built for this machine, and those of
+    /// every platform in `fmu-binaries/PLATFORM`.
+    pub binaries: PathBuf,
+    /// Whether to write the SSP package that holds both FMUs connected.
+    pub ssp: bool,
+}
+
+/// What an export wrote.
+#[derive(Clone, Debug)]
+#[non_exhaustive]
+pub struct Exported {
+    /// Every file, in alphabetical order.
+    pub paths: Vec<PathBuf>,
+    /// Platforms for which the FMUs hold binaries.
+    pub packed: Vec<Packed>,
+    /// Platforms whose binaries are older than those of this machine and were left out.
+    pub outdated: Vec<&'static str>,
+}
+
+/// A platform for which an FMU holds a binary.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
+pub struct Packed {
+    /// Name of the platform in FMI 2.0.
+    pub platform: &'static str,
+    /// Whether the binary was built for this machine only, not for older ones of its platform.
+    pub native: bool,
+}
+
+/// Writes both FMUs of a design, and on request the SSP package; refuses a design whose
+/// certificate does not check. Every file is written, or none.
+///
+/// # Errors
+/// [`Error::Uncertified`], [`Error::NoBinaries`], [`Error::Binary`] or [`Error::Output`];
+/// [`Error::Contents`] where a file cannot be made from this design.
+pub fn export(design: &Design, options: &Options) -> Result<Exported, Error> {
+    prove(design)?;
+    let staging = Staging::new(&options.out)?;
+    let json = |error: serde_json::Error| Error::Contents {
+        file: "resources/design.json".into(),
+        what: error.to_string(),
+    };
+    let resource = serde_json::to_vec(design).map_err(json)?;
+    let exporter = Exporter {
+        design,
+        certificate: serde_json::to_vec_pretty(&Certificate::of(design, &resource))
+            .map_err(json)?,
+        resource,
+        interface: Interface::from(design),
+        runs: documentation::runs(design),
+        binaries: Binaries::find(&options.binaries)?,
+    };
+    let mut fmus = Contents::new();
+    for kind in &KINDS {
+        fmus.insert(exporter.file(kind), exporter.fmu(kind)?);
+    }
+    for (name, bytes) in &fmus {
+        staging.add(name, bytes)?;
+    }
+    if options.ssp {
+        let name = format!("{}.ssp", design.name);
+        staging.add(&name, &exporter.package(&name, &fmus)?)?;
+    }
+    let (outdated, packed): (Vec<_>, Vec<_>) = exporter
+        .binaries
+        .iter()
+        .partition(|binaries| binaries.outdated);
+    let packed = packed.iter().map(|binaries| Packed {
+        platform: binaries.platform.name,
+        native: binaries.native,
+    });
+    Ok(Exported {
+        paths: staging.commit()?,
+        packed: packed.collect(),
+        outdated: outdated
+            .iter()
+            .map(|binaries| binaries.platform.name)
+            .collect(),
+    })
+}
+
+impl Kind {
+    /// The FMU's name, and that of its binaries.
+    pub fn identifier(&self, design: &Design) -> String {
+        format!("{}_{}", design.name, self.suffix)
+    }
+
+    /// `modelDescription.xml` of a design whose record has these bytes.
+    ///
+    /// # Errors
+    /// What the XML writer says.
+    pub fn describe(&self, design: &Design, resource: &[u8]) -> Result<String, Error> {
+        let identifier = &self.identifier(design);
+        let interface = Interface::from(design);
+        xml::write(&Document {
+            model_name: identifier,
+            model_identifier: identifier,
+            description: self.description,
+            guid: &model_description::guid(self.binary, resource),
+            version: env!("CARGO_PKG_VERSION"),
+            license: env!("CARGO_PKG_LICENSE"),
+            step_size: interface.sample_time,
+            stop_time: interface.stop_time,
+            directional_derivative: true,
+            table: &(self.table)(&interface),
+        })
+        .map_err(|what| Error::Contents {
+            file: format!("modelDescription.xml of {identifier}"),
+            what: what.to_string(),
+        })
+    }
+}
+
+impl Exporter<'_> {
+    fn file(&self, kind: &Kind) -> String {
+        format!("{}.fmu", kind.identifier(self.design))
+    }
+
+    fn fmu(&self, kind: &Kind) -> Result<Vec<u8>, Error> {
+        let identifier = kind.identifier(self.design);
+        let mut contents = Contents::from([
+            (
+                "modelDescription.xml".into(),
+                kind.describe(self.design, &self.resource)?.into_bytes(),
+            ),
+            ("model.png".into(), ICON.into()),
+            ("resources/design.json".into(), self.resource.clone()),
+            (certificate::PATH.into(), self.certificate.clone()),
+            (
+                "documentation/index.html".into(),
+                self.document(kind).into_bytes(),
+            ),
+            ("documentation/licenses/license.txt".into(), LICENSES.into()),
+        ]);
+        for binaries in self.binaries.iter().filter(|binaries| !binaries.outdated) {
+            contents.insert(binaries.platform.path(&identifier), binaries.read(kind)?);
+        }
+        archive::zip(&identifier, &contents)
+    }
+
+    fn document(&self, kind: &Kind) -> String {
+        let title = format!("{}: {}", self.design.name, kind.suffix);
+        let lead = format!("{}.", kind.description);
+        documentation::page(self.design, &self.runs, title, lead)
+    }
+
+    /// The SSP package: the FMUs under `resources/` beside the description of how they connect.
+    fn package(&self, name: &str, fmus: &Contents) -> Result<Vec<u8>, Error> {
+        let component = |kind: &'static Kind| Component {
+            name: kind.suffix,
+            source: format!("{}/{}", ssp::RESOURCES, self.file(kind)),
+            table: (kind.table)(&self.interface),
+        };
+        let system = System {
+            name: &self.design.name,
+            description: "Switched plant under sensor-fault-tolerant control",
+            stop_time: self.interface.stop_time,
+            step_size: self.interface.sample_time,
+            components: KINDS.iter().map(component).collect(),
+        };
+        let description = ssp::describe(&system).map_err(|error| Error::Contents {
+            file: name.into(),
+            what: error.to_string(),
+        })?;
+        let mut contents: Contents = fmus
+            .iter()
+            .map(|(file, bytes)| (format!("{}/{file}", ssp::RESOURCES), bytes.clone()))
+            .collect();
+        contents.insert(ssp::DESCRIPTION.into(), description);
+        archive::zip(name, &contents)
+    }
+}
+
+fn prove(design: &Design) -> Result<(), Error> {
+    let refused = |what: String| Error::Uncertified(what);
+    let synthesis = design
+        .synthesis
+        .as_ref()
+        .ok_or_else(|| refused("the design carries no certificate and is not exported".into()))?;
+    synthesis
+        .verify(&design.controller.plant)
+        .map_err(|error| refused(format!("the certificate does not check ({error})")))
+}
+
+/// The generic binaries of one platform.
+struct Binaries {
+    platform: &'static Platform,
+    /// Directory they are in.
+    folder: PathBuf,
+    /// Whether they are those that cargo built for this machine.
+    native: bool,
+    /// Whether the sources were built again since, on this machine but not for that platform.
+    outdated: bool,
+}
+
+impl Binaries {
+    /// All that are built. For this machine's own platform the newest, else the portable ones.
+    fn find(folder: &Path) -> Result<Vec<Self>, Error> {
+        let found = Self::all(folder);
+        match found.iter().all(|binaries| binaries.outdated) {
+            true => Err(Error::NoBinaries {
+                library: folder.join(host_library(CONTROLLER)),
+            }),
+            false => Ok(found),
+        }
+    }
+
+    fn all(folder: &Path) -> Vec<Self> {
+        let built_here = newest(folder, host_library);
+        PLATFORMS
+            .iter()
+            .filter_map(|platform| {
+                let others = folder.join("fmu-binaries").join(platform.name);
+                let library = |binary: &str| format!("{binary}.{}", platform.extension);
+                let prebuilt = newest(&others, library);
+                let current = prebuilt.is_some() && prebuilt >= built_here;
+                let native = !current && platform.name == HOST && built_here.is_some();
+                (native || prebuilt.is_some()).then(|| Self {
+                    platform,
+                    folder: if native { folder.into() } else { others },
+                    native,
+                    outdated: !native && !current,
+                })
+            })
+            .collect()
+    }
+
+    fn read(&self, kind: &Kind) -> Result<Vec<u8>, Error> {
+        let path = self.folder.join(if self.native {
+            host_library(kind.binary)
+        } else {
+            format!("{}.{}", kind.binary, self.platform.extension)
+        });
+        fs::read(&path).map_err(|source| Error::Binary {
+            library: path,
+            source,
+        })
+    }
+}
+
+/// When the last of the two libraries was built; `None` unless both are there.
+fn newest(folder: &Path, library: impl Fn(&str) -> String) -> Option<SystemTime> {
+    let built = |binary: &str| fs::metadata(folder.join(library(binary)))?.modified();
+    let times = KINDS.iter().map(|kind| built(kind.binary));
+    times
+        .collect::<std::io::Result<Vec<_>>>()
+        .ok()?
+        .into_iter()
+        .max()
+}
+
+/// What cargo calls the shared library on this platform.
+fn host_library(binary: &str) -> String {
+    format!(
+        "{}{binary}{}",
+        std::env::consts::DLL_PREFIX,
+        std::env::consts::DLL_SUFFIX
+    )
+}

@@ -1,0 +1,275 @@
+//! Proves again, from the doubles an FMU ships, what it promises. Nothing is solved.
+
+use crate::Error;
+use crate::certificate::{self, Certificate, Promise};
+use crate::export::{KINDS, Kind};
+use crate::platform::PLATFORMS;
+use ftc_design::Design;
+use roxmltree::Document;
+use serde_json::{Value, json};
+use std::collections::BTreeMap;
+use std::fmt;
+use std::fs::{self, File};
+use std::io::Read;
+use std::path::Path;
+use zip::ZipArchive;
+
+const DESIGN: &str = "resources/design.json";
+const DESCRIPTION: &str = "modelDescription.xml";
+
+/// No entry of an FMU of ours is larger.
+const LARGEST_ENTRY: u64 = 256 << 20;
+
+/// Why an FMU is not verified.
+enum Refusal {
+    /// It cannot be read, or is none of ours.
+    Unreadable(String),
+    /// It does not hold what it promises.
+    Unproved(String),
+}
+
+use Refusal::{Unproved, Unreadable};
+
+/// Reads an FMU and proves its certificate again.
+///
+/// # Errors
+/// [`Error::Unreadable`] for a file that is not an FMU of this program or is damaged,
+/// [`Error::Unproved`] where its parts do not agree or a promise cannot be proved.
+pub fn verify(path: &Path) -> Result<Verification, Error> {
+    let fmu = path.to_path_buf();
+    let result = contents(path).and_then(|files| Fmu { files }.verify());
+    result.map_err(|refusal| match refusal {
+        Unreadable(what) => Error::Unreadable { fmu, what },
+        Unproved(what) => Error::Unproved { fmu, what },
+    })
+}
+
+/// Every file of the archive; reading one checks its checksum.
+fn contents(path: &Path) -> Result<BTreeMap<String, Vec<u8>>, Refusal> {
+    let file = File::open(path)
+        .map_err(|error| Unreadable(format!("cannot be opened ({error}): name an FMU")))?;
+    if fs::metadata(path).is_ok_and(|about| about.is_dir()) {
+        return Err(Unreadable("this is a directory: name an FMU in it".into()));
+    }
+    let damaged =
+        |what: String| Unreadable(format!("the archive is damaged ({what}): export it again"));
+    let mut archive = ZipArchive::new(file).map_err(|error| match is_zip(path) {
+        true => damaged(error.to_string()),
+        false => Unreadable("this is no FMU: name one that ftc-fmu export wrote".into()),
+    })?;
+    let mut files = BTreeMap::new();
+    for index in 0..archive.len() {
+        let mut entry = archive
+            .by_index(index)
+            .map_err(|error| damaged(error.to_string()))?;
+        let name = entry
+            .name()
+            .map_err(|error| damaged(error.to_string()))?
+            .into_owned();
+        let mut bytes = Vec::new();
+        (&mut entry)
+            .take(LARGEST_ENTRY)
+            .read_to_end(&mut bytes)
+            .map_err(|error| damaged(format!("{name}: {error}")))?;
+        if bytes.len() as u64 == LARGEST_ENTRY || files.insert(name.clone(), bytes).is_some() {
+            return Err(damaged(format!("{name} is too large or stands twice")));
+        }
+    }
+    Ok(files)
+}
+
+/// Whether a file begins as zip archives do.
+fn is_zip(path: &Path) -> bool {
+    let mut magic = [0; 2];
+    File::open(path)
+        .and_then(|mut file| file.read_exact(&mut magic))
+        .is_ok()
+        && &magic == b"PK"
+}
+
+/// An unpacked FMU.
+struct Fmu {
+    files: BTreeMap<String, Vec<u8>>,
+}
+
+impl Fmu {
+    fn verify(&self) -> Result<Verification, Refusal> {
+        let bytes = self.file(DESIGN)?;
+        let kind = self.kind(bytes)?;
+        let design: Design = parse(DESIGN, bytes)?;
+        design.check().map_err(Unproved)?;
+        let shipped: Certificate = parse(certificate::PATH, self.file(certificate::PATH)?)?;
+        certificate::covers_what_runs(&design).map_err(Unproved)?;
+        let expected = Certificate::of(&design, bytes)
+            .ok_or_else(|| Unproved(format!("{DESIGN} holds no proof: export it again")))?;
+        shipped.agree(&expected).map_err(Unproved)?;
+        if let Some(synthesis) = &design.synthesis {
+            synthesis
+                .verify(&design.controller.plant)
+                .map_err(|error| Unproved(format!("{error}: export the design again")))?;
+        }
+        self.check_description(kind, &design, bytes)?;
+        let platforms = self.check_binaries(&kind.identifier(&design))?;
+        Ok(Verification {
+            design,
+            certificate: shipped,
+            platforms,
+        })
+    }
+
+    fn file(&self, name: &str) -> Result<&Vec<u8>, Refusal> {
+        self.files.get(name).ok_or_else(|| {
+            Unreadable(format!(
+                "there is no {name} in it: name an FMU that ftc-fmu export wrote"
+            ))
+        })
+    }
+
+    /// Which FMU this is: the one whose guid belongs to the design.
+    fn kind(&self, design: &[u8]) -> Result<&'static Kind, Refusal> {
+        let text = std::str::from_utf8(self.file(DESCRIPTION)?)
+            .map_err(|_| Unreadable(format!("{DESCRIPTION} is not UTF-8: export it again")))?;
+        let document = Document::parse(text)
+            .map_err(|error| Unreadable(format!("{DESCRIPTION}: {error}: export it again")))?;
+        let guid = document.root_element().attribute("guid");
+        let belongs = |kind: &&Kind| guid == Some(&model_description::guid(kind.binary, design));
+        KINDS.iter().find(belongs).ok_or_else(|| {
+            Unproved(format!(
+                "the guid in {DESCRIPTION} does not belong to {DESIGN}: one of them was changed, export it again"
+            ))
+        })
+    }
+
+    /// The description is, byte by byte, the one that belongs to the design.
+    fn check_description(&self, kind: &Kind, design: &Design, bytes: &[u8]) -> Result<(), Refusal> {
+        let expected = kind
+            .describe(design, bytes)
+            .map_err(|error| Unproved(error.to_string()))?;
+        let found = self.file(DESCRIPTION)?;
+        if found == expected.as_bytes() {
+            return Ok(());
+        }
+        let pairs = found
+            .split(|&b| b == b'\n')
+            .zip(expected.as_bytes().split(|&b| b == b'\n'));
+        let line = pairs
+            .take_while(|(found, expected)| found == expected)
+            .count()
+            + 1;
+        Err(Unproved(format!(
+            "{DESCRIPTION} is not the one of {DESIGN} from line {line} on: it was changed, or another version \
+             of ftc-fmu wrote it; export it again"
+        )))
+    }
+
+    /// There is a binary, and each is one for its platform; returns the platforms.
+    fn check_binaries(&self, identifier: &str) -> Result<Vec<&'static str>, Refusal> {
+        let mut platforms = Vec::new();
+        let files = self.files.iter();
+        for (path, bytes) in
+            files.filter(|(path, _)| path.starts_with("binaries/") && !path.ends_with('/'))
+        {
+            let platform = PLATFORMS
+                .iter()
+                .find(|platform| platform.path(identifier) == *path)
+                .ok_or_else(|| {
+                    Unproved(format!("{path} is no part of this FMU: export it again"))
+                })?;
+            platform
+                .check(bytes)
+                .map_err(|what| Unproved(format!("{path} {what}: export it again")))?;
+            platforms.push(platform.name);
+        }
+        match platforms.is_empty() {
+            true => Err(Unproved(
+                "there is no binary in it for any platform: export it again".into(),
+            )),
+            false => Ok(platforms),
+        }
+    }
+}
+
+fn parse<'a, T: serde::Deserialize<'a>>(name: &str, bytes: &'a [u8]) -> Result<T, Refusal> {
+    serde_json::from_slice(bytes)
+        .map_err(|error| Unreadable(format!("{name} cannot be read ({error}): export it again")))
+}
+
+/// A design whose promises are proved. Its `Display` is the report a person reads.
+#[derive(Clone, Debug)]
+#[non_exhaustive]
+pub struct Verification {
+    /// The design that the FMU holds.
+    pub design: Design,
+    /// What is promised, and what proves it.
+    pub certificate: Certificate,
+    /// Platforms for which there is a binary.
+    pub platforms: Vec<&'static str>,
+}
+
+impl fmt::Display for Verification {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let claims = &self.certificate.claims;
+        let modes = &self.design.controller.plant.modes;
+        writeln!(f, "{}: proved", self.design.name)?;
+        let mut line = |name: &str, value: String| writeln!(f, "  {name:<22}{value}");
+        line("state feedback", promise(&claims.state_feedback))?;
+        for (index, mode) in modes.iter().enumerate() {
+            let gamma = claims.gamma.as_ref().map_or_else(
+                || "no attenuation is claimed".into(),
+                |gamma| format!("l2 gain from the disturbance at most {}", gamma[index]),
+            );
+            line(&format!("mode {} ({})", index + 1, mode.name), gamma)?;
+        }
+        line("observer", promise(&claims.observer))?;
+        line(
+            "scope",
+            format!("the linear loop of {DESIGN}, while no input is at a limit"),
+        )?;
+        line(
+            "how",
+            "every inequality of the shipped doubles, rounding included; nothing was solved".into(),
+        )?;
+        line(
+            "binaries",
+            format!(
+                "{}: of the platform, with the functions of an FMU; their machine code is not proved",
+                self.platforms.join(", ")
+            ),
+        )
+    }
+}
+
+impl Verification {
+    /// The report a program reads.
+    pub fn json(&self) -> Value {
+        let claims = &self.certificate.claims;
+        let of = |promise: &Promise| {
+            json!({
+                "lyapunov": promise.lyapunov,
+                "arbitrary_switching": promise.dwell.is_none(),
+                "decay": promise.decay,
+                "dwell_time_samples": promise.dwell.map(|dwell| dwell.samples),
+                "dwell_time_seconds": promise.dwell.map(|dwell| dwell.seconds),
+            })
+        };
+        json!({
+            "verified": true,
+            "name": self.design.name,
+            "state_feedback": of(&claims.state_feedback),
+            "gamma": claims.gamma,
+            "observer": of(&claims.observer),
+            "platforms": self.platforms,
+        })
+    }
+}
+
+fn promise(promise: &Promise) -> String {
+    let decay = promise.decay;
+    match &promise.dwell {
+        None => format!("stable under arbitrary switching, decay {decay} per sample"),
+        Some(dwell) => format!(
+            "stable when modes last on average longer than {:.2} samples ({:.4} s), decay {decay} per sample within a mode",
+            dwell.samples, dwell.seconds
+        ),
+    }
+}

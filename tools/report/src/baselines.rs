@@ -1,0 +1,76 @@
+//! `simulate --baselines`: what the design is compared with, in the same scenario.
+
+use ftc_control::Controller;
+use ftc_design::{Design, DesignError};
+use ftc_simulate::baselines::predictive::{Predictive, PredictiveSpec};
+use ftc_simulate::baselines::{additive, deadbeat_bound, response_delay};
+use ftc_simulate::{PlantSimulator, Trajectory, Variant, run, run_with};
+
+/// Samples the predictive controller looks ahead.
+const HORIZON: usize = 20;
+/// Least noise its filter assumes, relative to the nominal value of an output.
+const LEAST_NOISE: f64 = 1e-3;
+
+/// The additive FTC of the paper's section III and model predictive control.
+///
+/// # Errors
+/// One sentence where one of them cannot be designed for this plant.
+pub fn trajectories(design: &Design, plant: &PlantSimulator) -> Result<Vec<Trajectory>, String> {
+    let parameters =
+        additive(design).map_err(|error: DesignError| format!("the additive baseline: {error}"))?;
+    let printed = run(plant, &Controller::new(parameters), Variant::Additive);
+    let delayed = design.controller.feedback.latency > 0;
+    let spec = predictive(design, &printed)?;
+    let mode = plant.initial_state().mode;
+    let mut controller = Predictive::new(&design.controller.plant, &spec, mode)
+        .map_err(|what| format!("the predictive baseline: {what}"))?;
+    if delayed {
+        controller = controller.one_sample_late();
+    }
+    let predicted = run_with(plant, &mut controller, Variant::Predictive, delayed);
+    Ok(vec![printed, predicted])
+}
+
+/// The predictive controller with the design's weights and limits. Its filter is told the noise
+/// and the mean power of the disturbance that the scenario plays.
+fn predictive(design: &Design, played: &Trajectory) -> Result<PredictiveSpec, String> {
+    let asked = &design
+        .synthesis
+        .as_ref()
+        .ok_or("the design carries no weights: design it again")?
+        .state_feedback
+        .spec;
+    let outputs = design.signals.outputs.iter();
+    let noise = outputs.zip(&design.scenario.noise);
+    let channels = design.controller.plant.dimensions().disturbances;
+    let power = |channel: usize| {
+        let records = &played.records;
+        let sum: f64 = records.iter().map(|r| r.disturbance[channel].powi(2)).sum();
+        (sum / records.len().max(1) as f64).sqrt()
+    };
+    Ok(PredictiveSpec {
+        tracked: asked.tracked.clone(),
+        output_weight: asked.output_weight.clone(),
+        input_weight: asked.input_weight.clone(),
+        limits: design.controller.input_limits.clone(),
+        noise: noise
+            .map(|(output, noise)| noise.max(LEAST_NOISE * output.nominal))
+            .collect(),
+        disturbance: (0..channels).map(power).collect(),
+        horizon: HORIZON,
+    })
+}
+
+/// Per tracked output, the deadbeat bound of the scenario's reference: the output follows as many samples late as the plant and the latency need.
+pub fn bound(design: &Design, played: &Trajectory) -> Vec<f64> {
+    let feedback = &design.controller.feedback;
+    let tracked = feedback.tracked.iter().enumerate();
+    tracked
+        .map(|(index, &output)| {
+            let reference: Vec<f64> = played.records.iter().map(|r| r.reference[index]).collect();
+            let start = played.records.first().map_or(0.0, |r| r.y_true[output]);
+            let delay = response_delay(&design.controller.plant, output) + feedback.latency;
+            deadbeat_bound(&reference, start, delay)
+        })
+        .collect()
+}

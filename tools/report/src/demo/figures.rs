@@ -1,0 +1,287 @@
+//! The figures of the page.
+
+use super::events::{any_fault_intervals, fault_intervals};
+use super::{RANKING, find, name_of, unit_of, variant_name};
+use crate::figure::{Dash, Figure, Ink, Mark, Point, Series, Weight};
+use crate::text::with_unit;
+use ftc_control::parameters::EstimatorMethod;
+use ftc_design::Design;
+use ftc_simulate::closed_loop::Record;
+use ftc_simulate::{Trajectory, Variant};
+
+const TIME: &str = "time (s)";
+const FAULTY: &str = "fault present";
+
+/// The runs of one scenario, and what all figures share.
+pub struct Scene<'a> {
+    design: &'a Design,
+    trajectories: &'a [Trajectory],
+    /// The run whose measurements, estimates and scenario are shown.
+    main: Option<&'a Trajectory>,
+    marks: Vec<Mark>,
+}
+
+impl<'a> Scene<'a> {
+    /// Collects the runs.
+    pub fn new(design: &'a Design, trajectories: &'a [Trajectory]) -> Self {
+        let main = find(trajectories, Variant::Ftc)
+            .or(trajectories.first())
+            .filter(|run| !run.records.is_empty());
+        let mut scene = Self {
+            design,
+            trajectories,
+            main,
+            marks: Vec::new(),
+        };
+        scene.marks = scene.switches();
+        scene
+    }
+
+    /// One figure per output: the true output of every variant about the reference.
+    pub fn outputs(&self) -> Vec<Figure> {
+        self.for_each(
+            |record| record.y.len(),
+            |run, output| self.output(run, output),
+        )
+    }
+
+    /// One figure per sensor: fault and estimate; none when nothing is estimated and nothing fails.
+    pub fn faults(&self) -> Vec<Figure> {
+        let Some(run) = self.main else {
+            return Vec::new();
+        };
+        let estimates = self.design.controller.estimator.method != EstimatorMethod::None;
+        if estimates || !any_fault_intervals(run).is_empty() {
+            self.for_each(
+                |record| record.f_hat.len(),
+                |run, sensor| self.fault(run, sensor),
+            )
+        } else {
+            Vec::new()
+        }
+    }
+
+    /// One figure per sensor: residual and threshold.
+    pub fn residuals(&self) -> Vec<Figure> {
+        if self.design.controller.estimator.method == EstimatorMethod::None {
+            return Vec::new();
+        }
+        self.for_each(
+            |record| record.residual.len(),
+            |run, sensor| self.residual(run, sensor),
+        )
+    }
+
+    /// One figure per input: the command of every variant.
+    pub fn inputs(&self) -> Vec<Figure> {
+        self.for_each(|record| record.u.len(), |run, input| self.input(run, input))
+    }
+
+    /// One figure per disturbance.
+    pub fn disturbances(&self) -> Vec<Figure> {
+        self.for_each(
+            |record| record.disturbance.len(),
+            |run, channel| {
+                let name = format!("w[{}]", channel + 1);
+                let points = self.points(run, |record| record.disturbance[channel]);
+                Figure::new(
+                    format!("disturbance-{}", channel + 1),
+                    format!("Disturbance {name}"),
+                    TIME,
+                    name.clone(),
+                )
+                .with(Series::new(name, points).ink(Ink::Purple))
+                .mark(&self.marks)
+            },
+        )
+    }
+
+    fn for_each(
+        &self,
+        size: impl Fn(&Record) -> usize,
+        make: impl Fn(&Trajectory, usize) -> Figure,
+    ) -> Vec<Figure> {
+        self.main.map_or_else(Vec::new, |run| {
+            (0..size(&run.records[0]))
+                .map(|index| make(run, index))
+                .collect()
+        })
+    }
+
+    fn output(&self, run: &Trajectory, output: usize) -> Figure {
+        let outputs = &self.design.signals.outputs;
+        let name = name_of(outputs, output, "y");
+        let label = with_unit(&name, unit_of(outputs, output));
+        let mut figure = Figure::new(
+            format!("output-{}", output + 1),
+            format!("Output {name}"),
+            TIME,
+            label,
+        )
+        .with(
+            Series::new("measured", self.points(run, |record| record.y[output]))
+                .ink(Ink::Faint)
+                .weight(Weight::Thin)
+                .secondary(),
+        );
+        for series in self.variants(|record| record.y_true[output]) {
+            figure = figure.with(series);
+        }
+        if let Some(row) = self
+            .design
+            .controller
+            .feedback
+            .tracked
+            .iter()
+            .position(|row| *row == output)
+        {
+            let reference = self.points(run, |record| record.reference[row]);
+            figure = figure.with(
+                Series::new("reference", reference)
+                    .ink(Ink::Text)
+                    .dash(Dash::Dotted)
+                    .weight(Weight::Normal)
+                    .step(),
+            );
+        }
+        figure
+            .shade(FAULTY, self.times(&fault_intervals(run, output)))
+            .mark(&self.marks)
+    }
+
+    fn fault(&self, run: &Trajectory, sensor: usize) -> Figure {
+        let outputs = &self.design.signals.outputs;
+        let name = name_of(outputs, sensor, "y");
+        // A sensor that gives no number has no additive fault to draw.
+        let truth = self.points(run, |record| {
+            if record.y[sensor].is_finite() {
+                record.fault[sensor]
+            } else {
+                f64::NAN
+            }
+        });
+        Figure::new(
+            format!("fault-{}", sensor + 1),
+            format!("Fault of sensor {name}"),
+            TIME,
+            with_unit(&format!("fault of {name}"), unit_of(outputs, sensor)),
+        )
+        .with(
+            Series::new("true fault", truth)
+                .ink(Ink::Ochre)
+                .weight(Weight::Broad)
+                .step(),
+        )
+        .with(Series::new("estimate", self.points(run, |record| record.f_hat[sensor])).step())
+        .shade(FAULTY, self.times(&fault_intervals(run, sensor)))
+        .mark(&self.marks)
+    }
+
+    fn residual(&self, run: &Trajectory, sensor: usize) -> Figure {
+        let outputs = &self.design.signals.outputs;
+        let name = name_of(outputs, sensor, "y");
+        let mut figure = Figure::new(
+            format!("residual-{}", sensor + 1),
+            format!("Residual of sensor {name}"),
+            TIME,
+            with_unit(&format!("residual of {name}"), unit_of(outputs, sensor)),
+        )
+        .with(
+            Series::new(
+                "residual",
+                self.points(run, |record| record.residual[sensor]),
+            )
+            .ink(Ink::Purple)
+            .weight(Weight::Thin)
+            .step(),
+        );
+        if let Some(&threshold) = self.design.controller.estimator.thresholds.get(sensor) {
+            let until = self.time(run.records[run.records.len() - 1].tick);
+            let from = self.time(run.records[0].tick);
+            let level = |name: String, value| {
+                Series::new(name, vec![[from, value], [until, value]])
+                    .ink(Ink::Vermilion)
+                    .dash(Dash::Dashed)
+                    .weight(Weight::Thin)
+            };
+            let name = format!("threshold ±{}", crate::text::number(threshold));
+            figure = figure
+                .with(level(name, threshold))
+                .with(level(String::new(), -threshold));
+        }
+        figure
+            .shade(FAULTY, self.times(&fault_intervals(run, sensor)))
+            .mark(&self.marks)
+    }
+
+    fn input(&self, run: &Trajectory, input: usize) -> Figure {
+        let inputs = &self.design.signals.inputs;
+        let name = name_of(inputs, input, "u");
+        let label = with_unit(&name, unit_of(inputs, input));
+        let mut figure = Figure::new(
+            format!("input-{}", input + 1),
+            format!("Input {name}"),
+            TIME,
+            label,
+        );
+        for series in self.variants(|record| record.u[input]) {
+            figure = figure.with(series.step());
+        }
+        figure
+            .shade("a sensor is faulty", self.times(&any_fault_intervals(run)))
+            .mark(&self.marks)
+    }
+
+    /// A signal of every variant, each in the variant's own look; the one this is about on top.
+    fn variants(&self, signal: impl Fn(&Record) -> f64) -> Vec<Series> {
+        RANKING
+            .into_iter()
+            .rev()
+            .filter_map(|variant| find(self.trajectories, variant))
+            .map(|run| {
+                let series = Series::new(variant_name(run.variant), self.points(run, &signal));
+                match run.variant {
+                    Variant::Ftc => series.ink(Ink::Blue),
+                    Variant::NoFtc => series.ink(Ink::Vermilion).dash(Dash::Dashed).secondary(),
+                    Variant::ToldTheFault => series.ink(Ink::Green).weight(Weight::Broad),
+                    Variant::Additive => series.ink(Ink::Ochre).dash(Dash::Dashed).secondary(),
+                    Variant::Predictive => series.ink(Ink::Purple).dash(Dash::Chain).secondary(),
+                }
+            })
+            .collect()
+    }
+
+    fn points(&self, run: &Trajectory, signal: impl Fn(&Record) -> f64) -> Vec<Point> {
+        run.records
+            .iter()
+            .map(|record| [self.time(record.tick), signal(record)])
+            .collect()
+    }
+
+    fn time(&self, tick: u64) -> f64 {
+        tick as f64 * self.design.controller.plant.sample_time
+    }
+
+    fn times(&self, intervals: &[[usize; 2]]) -> Vec<[f64; 2]> {
+        intervals
+            .iter()
+            .map(|interval| interval.map(|index| self.time(index as u64)))
+            .collect()
+    }
+
+    /// A mark wherever another mode becomes active.
+    fn switches(&self) -> Vec<Mark> {
+        let Some(run) = self.main else {
+            return Vec::new();
+        };
+        let modes = &self.design.controller.plant.modes;
+        run.records
+            .windows(2)
+            .filter(|pair| pair[0].mode != pair[1].mode)
+            .map(|pair| Mark {
+                at: self.time(pair[1].tick),
+                label: super::facts::mode_name(modes, pair[1].mode),
+            })
+            .collect()
+    }
+}

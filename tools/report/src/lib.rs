@@ -1,0 +1,29 @@
+//! Pages an engineer would forward: figures, tables and sentences in one self-contained file.
+//!
+//! A [`figure`] is plain data and becomes SVG in [`svg`]; a [`page`] is made of sections that hold
+//! figures, tables and key numbers; [`demo`] is the page of one simulated design. Nothing here
+//! needs a network or a script, and one file reads well in light, in dark, on a phone and on paper.
+//!
+//! SVG is written with the same template crate as the page. One plotting crate (kuva) was tried, one
+//! (poloto) was only read about, and one (plotters) was ruled out as no longer kept up. By that, none
+//! lets colours follow the reader's scheme *and* leaves a gap where a sensor gives no number
+//! *and* gives ids that stay unique when twenty figures share a page; two of the three also fix the
+//! size in pixels and spend a third of a phone's width on the legend.
+
+mod axis;
+pub mod baselines;
+mod decimate;
+mod demo;
+pub mod documentation;
+pub mod figure;
+pub mod page;
+pub mod simulate;
+pub mod summary;
+mod svg;
+pub mod text;
+pub mod warnings;
+
+pub use demo::{Scene, events, files, page};
+
+#[cfg(test)]
+mod tests;

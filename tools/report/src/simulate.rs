@@ -1,0 +1,247 @@
+//! Every variant of the loop, simulated natively and written down sample by sample.
+
+use crate::baselines;
+use crate::warnings;
+use ftc_control::Controller;
+use ftc_design::Design;
+use ftc_simulate::closed_loop::{Merits, Record};
+use ftc_simulate::{PlantSimulator, Trajectory, Variant, run};
+use serde_json::{Map, Value, json};
+use std::fmt::Write;
+
+/// Everything that `simulate` writes, and what it says.
+pub struct Simulation {
+    /// Name and contents of every file.
+    pub files: Vec<(String, Vec<u8>)>,
+    /// The figures of merit as a table for a person.
+    pub summary: String,
+    /// What its user should know of the design and of the runs.
+    pub warnings: Vec<String>,
+}
+
+/// Runs the scenario in every variant, and with every baseline if asked for:
+/// `trajectories.csv`, `metrics.json` and the report. `warnings` are those of the design.
+///
+/// # Errors
+/// One sentence about a baseline.
+pub fn simulate(
+    design: &Design,
+    mut warnings: Vec<String>,
+    baselines: bool,
+) -> Result<Simulation, String> {
+    let mut trajectories = trajectories(design);
+    let mut bound = None;
+    if baselines {
+        trajectories.extend(baselines::trajectories(design, &plant(design))?);
+        bound = Some(baselines::bound(design, &trajectories[0]));
+    }
+    warnings.extend(warnings::of_runs(design, &trajectories));
+    let csv = table(design, &trajectories).map_err(|error| error.to_string())?;
+    let metrics = metrics(design, &trajectories, bound.as_deref(), &warnings);
+    let mut files = vec![
+        ("trajectories.csv".to_string(), csv),
+        ("metrics.json".to_string(), metrics.into_bytes()),
+    ];
+    let page = crate::files(design, &trajectories, &warnings);
+    files.extend(
+        page.into_iter()
+            .map(|(name, text)| (name, text.into_bytes())),
+    );
+    Ok(Simulation {
+        files,
+        summary: summary(design, &trajectories, bound.as_deref()),
+        warnings,
+    })
+}
+
+fn plant(design: &Design) -> PlantSimulator {
+    PlantSimulator::with_truth(
+        design.controller.plant.clone(),
+        design.truth.clone(),
+        design.scenario.clone(),
+    )
+}
+
+/// Every variant of the design's scenario.
+pub fn trajectories(design: &Design) -> Vec<Trajectory> {
+    Variant::ALL
+        .iter()
+        .map(|&variant| one(design, variant))
+        .collect()
+}
+
+/// One variant of the design's scenario.
+pub fn one(design: &Design, variant: Variant) -> Trajectory {
+    let controller = Controller::new(design.controller.clone());
+    run(&plant(design), &controller, variant)
+}
+
+/// One row per sample: `t`, `mode` and the signals of the scenario, then those of each variant.
+fn table(design: &Design, trajectories: &[Trajectory]) -> Result<Vec<u8>, csv::Error> {
+    let mut writer = csv::Writer::from_writer(Vec::new());
+    let records = trajectories.first().map_or(&[][..], |run| &run.records);
+    if let Some(first) = records.first() {
+        writer.write_record(header(first, trajectories))?;
+    }
+    let mut row = Vec::new();
+    for (at, record) in records.iter().enumerate() {
+        row.clear();
+        let time = record.tick as f64 * design.controller.plant.sample_time;
+        row.push(number(time));
+        row.push((record.mode + 1).to_string());
+        for (_, values) in shared(record) {
+            row.extend(values.iter().map(|&value| number(value)));
+        }
+        for trajectory in trajectories {
+            let record = &trajectory.records[at];
+            for (_, values) in own(record) {
+                row.extend(values.iter().map(|&value| number(value)));
+            }
+            row.extend(
+                record
+                    .flagged
+                    .iter()
+                    .map(|&flag| u8::from(flag).to_string()),
+            );
+        }
+        writer.write_record(&row)?;
+    }
+    writer
+        .into_inner()
+        .map_err(|error| error.into_error().into())
+}
+
+/// Signals that are the same in every variant.
+fn shared(record: &Record) -> [(&'static str, &[f64]); 4] {
+    [
+        ("y_ref", &record.reference),
+        ("w", &record.disturbance),
+        ("f", &record.fault),
+        ("noise", &record.noise),
+    ]
+}
+
+/// Signals of one variant; the flags follow them.
+fn own(record: &Record) -> [(&'static str, &[f64]); 7] {
+    [
+        ("y", &record.y),
+        ("y_true", &record.y_true),
+        ("x", &record.x),
+        ("u", &record.u),
+        ("x_hat", &record.x_hat),
+        ("f_hat", &record.f_hat),
+        ("residual", &record.residual),
+    ]
+}
+
+fn header(record: &Record, trajectories: &[Trajectory]) -> Vec<String> {
+    let vector = |prefix: &str, name: &str, size: usize| -> Vec<String> {
+        (1..=size).map(|i| format!("{prefix}{name}[{i}]")).collect()
+    };
+    let mut names = vec!["t".to_string(), "mode".to_string()];
+    for (name, values) in shared(record) {
+        names.extend(vector("", name, values.len()));
+    }
+    for trajectory in trajectories {
+        let prefix = format!("{}.", trajectory.variant.key());
+        for (name, values) in own(record) {
+            names.extend(vector(&prefix, name, values.len()));
+        }
+        names.extend(vector(&prefix, "fault", record.flagged.len()));
+    }
+    names
+}
+
+/// The shortest text that reads back as the same double.
+fn number(value: f64) -> String {
+    format!("{value:?}")
+}
+
+/// Per variant `mse` and `vaf`, each measured and true, one number per tracked output; of the
+/// deadbeat bound the true `mse` alone. Beside them the `warnings`, one sentence each.
+fn metrics(
+    design: &Design,
+    trajectories: &[Trajectory],
+    bound: Option<&[f64]>,
+    warnings: &[String],
+) -> String {
+    let tracked = &design.controller.feedback.tracked;
+    let of = |trajectory: &Trajectory| {
+        let merits = trajectory.merits(tracked);
+        let list = |pick: fn(&Merits) -> f64| merits.iter().map(pick).collect::<Vec<f64>>();
+        let value = json!({
+            "mse": { "measured": list(|m| m.measured.mse), "true": list(|m| m.truth.mse) },
+            "vaf": { "measured": list(|m| m.measured.vaf), "true": list(|m| m.truth.vaf) },
+        });
+        (trajectory.variant.key().to_string(), value)
+    };
+    let mut variants: Map<String, Value> = trajectories.iter().map(of).collect();
+    if let Some(mse) = bound {
+        variants.insert(BOUND.into(), json!({ "mse": { "true": mse } }));
+    }
+    variants.insert("warnings".into(), json!(warnings));
+    format!("{:#}\n", Value::Object(variants))
+}
+
+/// Name of the deadbeat bound in files.
+const BOUND: &str = "deadbeat_bound";
+
+/// The same as a small table for a person.
+fn summary(design: &Design, trajectories: &[Trajectory], bound: Option<&[f64]>) -> String {
+    let mut text = format!(
+        "{}: {} samples of {} s\n\n{:<16}{:<12}{:>14}{:>14}{:>12}{:>12}\n",
+        design.name,
+        design.scenario.steps,
+        design.controller.plant.sample_time,
+        "variant",
+        "output",
+        "MSE measured",
+        "MSE true",
+        "VAF meas. %",
+        "VAF true %",
+    );
+    let tracked = &design.controller.feedback.tracked;
+    let mut constant = false;
+    for trajectory in trajectories {
+        let merits = trajectory.merits(tracked);
+        for (row, (merits, &output)) in merits.iter().zip(tracked).enumerate() {
+            let varies = varies(trajectory, row);
+            constant |= !varies;
+            let vaf = |value: f64| match varies {
+                true => format!("{value:.3}"),
+                false => "-".into(),
+            };
+            let _ = writeln!(
+                text,
+                "{:<16}{:<12}{:>14.5e}{:>14.5e}{:>12}{:>12}",
+                trajectory.variant.key(),
+                design.signals.outputs[output].name,
+                merits.measured.mse,
+                merits.truth.mse,
+                vaf(merits.measured.vaf),
+                vaf(merits.truth.vaf),
+            );
+        }
+    }
+    for (mse, &output) in bound.unwrap_or_default().iter().zip(tracked) {
+        let name = &design.signals.outputs[output].name;
+        let _ = writeln!(text, "{BOUND:<16}{name:<12}{:>14}{mse:>14.5e}", "");
+    }
+    if constant {
+        text.push_str(
+            "\n-: VAF compares variances and means nothing where the reference is constant\n",
+        );
+    }
+    text.push('\n');
+    text
+}
+
+/// Whether the reference of a tracked output moves at all.
+fn varies(trajectory: &Trajectory, row: usize) -> bool {
+    let mut values = trajectory
+        .records
+        .iter()
+        .map(|record| record.reference[row]);
+    let first = values.next();
+    values.any(|value| Some(value) != first)
+}

@@ -1,0 +1,307 @@
+//! The design report, for a person and for a program.
+
+use crate::text::count;
+use crate::warnings;
+use ftc_control::parameters::{EstimatorMethod, ObserverKind};
+use ftc_design::{ControlSpec, Design, DesignError, ObserverDesign, Signal, StateFeedback};
+use serde_json::{Value, json};
+use std::fmt::Write;
+
+/// The report a person reads.
+pub fn text(design: &Design, warnings: &[String]) -> String {
+    let mut text = String::new();
+    for (title, lines) in sections(design) {
+        let _ = writeln!(text, "{title}");
+        for (name, value) in lines {
+            let _ = writeln!(text, "  {name:<22}{value}");
+        }
+        text.push('\n');
+    }
+    text + &warnings::text(warnings)
+}
+
+/// A titled list of named values.
+pub type Section = (&'static str, Vec<(String, String)>);
+
+/// The report's contents, also for the FMU's documentation.
+pub fn sections(design: &Design) -> Vec<Section> {
+    let mut sections = vec![("Design", overview(design))];
+    if let Some(synthesis) = &design.synthesis {
+        sections.push((
+            "State feedback",
+            feedback(design, &synthesis.state_feedback),
+        ));
+    }
+    sections.push(("Observer", observer(design)));
+    sections.push(("Fault estimator", estimator(design)));
+    if let Some(synthesis) = &design.synthesis {
+        sections.push(("Certificate", certificate(&synthesis.state_feedback)));
+    }
+    sections
+}
+
+fn line(name: impl Into<String>, value: impl Into<String>) -> (String, String) {
+    (name.into(), value.into())
+}
+
+fn overview(design: &Design) -> Vec<(String, String)> {
+    let plant = &design.controller.plant;
+    let dims = plant.dimensions();
+    let names: Vec<&str> = plant.modes.iter().map(|mode| mode.name.as_str()).collect();
+    vec![
+        line("name", &design.name),
+        line("sample time", format!("{} s", plant.sample_time)),
+        line(
+            "plant",
+            format!(
+                "{}, {}, {}, {}",
+                count(dims.states, "state"),
+                count(dims.inputs, "input"),
+                count(dims.outputs, "output"),
+                count(dims.disturbances, "disturbance")
+            ),
+        ),
+        line("modes", names.join(", ")),
+    ]
+}
+
+fn feedback(design: &Design, control: &StateFeedback) -> Vec<(String, String)> {
+    let spec = &control.spec;
+    let tracked: Vec<&str> = spec
+        .tracked
+        .iter()
+        .map(|&output| design.signals.outputs[output].name.as_str())
+        .collect();
+    let mut lines = vec![
+        line("tracked outputs", tracked.join(", ")),
+        line("latency", count(spec.latency, "sample")),
+        line("decay asked", format!("{} per sample", spec.decay)),
+    ];
+    lines.extend(internal_model(design, control));
+    for (index, radius) in control.spectral_radius.iter().enumerate() {
+        let gamma = attenuation(control, index);
+        lines.push(line(
+            format!("mode {}", index + 1),
+            format!("{gamma}, spectral radius {radius:.4}"),
+        ));
+    }
+    lines
+}
+
+/// What is proved of the disturbance's way to the performance signal in one mode, and whether that is
+/// the best there is.
+fn attenuation(control: &StateFeedback, mode: usize) -> String {
+    let Some(gamma) = control.gamma.as_ref().map(|gamma| gamma[mode]) else {
+        return "no disturbance".into();
+    };
+    let gamma = match gamma < 1e-3 {
+        true => format!("gamma {gamma:.1e}"),
+        false => format!("gamma {gamma:.4}"),
+    };
+    match control.is_optimal(mode) {
+        Some(false) => gamma + " (not proved optimal)",
+        _ => gamma,
+    }
+}
+
+/// The periods at which the tracking error vanishes beside its constant part.
+fn internal_model(design: &Design, control: &StateFeedback) -> Option<(String, String)> {
+    let sample_time = design.controller.plant.sample_time;
+    let angles = control.spec.resonators.iter();
+    let periods: Vec<String> = angles
+        .map(|angle| format!("{:.6} s", core::f64::consts::TAU / angle * sample_time))
+        .collect();
+    let named = || format!("resonators at periods {}", periods.join(", "));
+    (!periods.is_empty()).then(|| line("internal model", named()))
+}
+
+fn observer(design: &Design) -> Vec<(String, String)> {
+    let observer = &design.controller.observer;
+    let kind = match observer.kind {
+        ObserverKind::Uio => "unknown input observer (the state disturbance is decoupled)",
+        ObserverKind::Luenberger => "Luenberger observer",
+    };
+    let mut lines = vec![line("kind", kind)];
+    lines.extend(observer.note.iter().map(|note| line("because", note)));
+    if let Some(synthesis) = &design.synthesis {
+        lines.extend(observer_decay(&synthesis.observer));
+    }
+    lines
+}
+
+fn estimator(design: &Design) -> Vec<(String, String)> {
+    let estimator = &design.controller.estimator;
+    let method = match estimator.method {
+        EstimatorMethod::Reference => "reference (predictor from a healthy database)",
+        EstimatorMethod::Sliding => "sliding window as printed",
+        EstimatorMethod::None => "none",
+    };
+    let mut lines = vec![line("method", method)];
+    if estimator.method == EstimatorMethod::None {
+        return lines;
+    }
+    let outputs = &design.signals.outputs;
+    lines.push(line(
+        "response length",
+        count(estimator.response_length, "sample"),
+    ));
+    for (index, predictor) in estimator.predictors.iter().enumerate() {
+        lines.push(line(
+            format!("mode {}", index + 1),
+            format!(
+                "{} samples, residual deviation {}",
+                predictor.samples,
+                with_units(&predictor.deviation, outputs)
+            ),
+        ));
+    }
+    lines.push(line(
+        "thresholds",
+        with_units(&estimator.thresholds, outputs),
+    ));
+    lines.push(line(
+        "debounce",
+        count(estimator.debounce as usize, "sample"),
+    ));
+    if estimator.stuck_after > 0 {
+        lines.push(line(
+            "stuck after",
+            format!("{} repetitions of a reading", estimator.stuck_after),
+        ));
+    }
+    if let Some(harmonics) = &estimator.harmonics {
+        lines.push(line(
+            "disturbance",
+            format!(
+                "period {:.6} samples, {}",
+                harmonics.period,
+                count(harmonics.count, "harmonic")
+            ),
+        ));
+    }
+    lines
+}
+
+fn observer_decay(observer: &ObserverDesign) -> Vec<(String, String)> {
+    let radius = |(index, radius): (usize, &f64)| {
+        line(
+            format!("mode {}", index + 1),
+            format!("spectral radius of the error {radius:.4}"),
+        )
+    };
+    let mut lines = vec![line(
+        "decay asked",
+        format!("{} per sample", observer.spec.decay),
+    )];
+    lines.extend(observer.spectral_radius.iter().enumerate().map(radius));
+    lines
+}
+
+fn certificate(control: &StateFeedback) -> Vec<(String, String)> {
+    let guarantee = match &control.dwell {
+        None => "stable under arbitrary switching".to_string(),
+        Some(dwell) => format!(
+            "stable when modes last on average longer than {:.2} samples ({:.4} s)",
+            dwell.samples, dwell.seconds
+        ),
+    };
+    vec![
+        line("Lyapunov", control.spec.lyapunov.to_string()),
+        line("guarantee", guarantee),
+        line(
+            "proof",
+            "every inequality of the shipped gains is proved positive definite, rounding included",
+        ),
+    ]
+}
+
+fn with_units(values: &[f64], signals: &[Signal]) -> String {
+    let one = |(value, signal): (&f64, &Signal)| match &signal.unit {
+        Some(unit) => format!("{value:.3e} {unit}"),
+        None => format!("{value:.3e}"),
+    };
+    let texts: Vec<String> = values.iter().zip(signals).map(one).collect();
+    texts.join(", ")
+}
+
+/// The report a program reads.
+pub fn json(design: &Design, warnings: &[String]) -> String {
+    let estimator = &design.controller.estimator;
+    let control = design
+        .synthesis
+        .as_ref()
+        .map(|synthesis| &synthesis.state_feedback);
+    let deviations: Vec<&Vec<f64>> = estimator.predictors.iter().map(|p| &p.deviation).collect();
+    let samples: Vec<usize> = estimator.predictors.iter().map(|p| p.samples).collect();
+    let value = json!({
+        "name": design.name,
+        "feasible": true,
+        "certified": control.is_some(),
+        "gamma": control.and_then(|c| c.gamma.clone()),
+        "gamma_is_optimal": control.and_then(|c| (0..c.modes.len()).map(|mode| c.is_optimal(mode)).collect::<Option<Vec<_>>>()),
+        "decay": control.map(|c| c.spec.decay),
+        "spectral_radius": control.map(|c| c.spectral_radius.clone()),
+        "dwell_time_samples": control.and_then(|c| c.dwell.map(|dwell| dwell.samples)),
+        "dwell_time_seconds": control.and_then(|c| c.dwell.map(|dwell| dwell.seconds)),
+        "lyapunov": control.map(|c| c.spec.lyapunov),
+        "latency": control.map(|c| c.spec.latency),
+        "resonators": control.map(|c| c.spec.resonators.clone()),
+        "observer": {
+            "kind": design.controller.observer.kind,
+            "note": design.controller.observer.note,
+            "decay": design.synthesis.as_ref().map(|s| s.observer.spec.decay),
+            "spectral_radius": design.synthesis.as_ref().map(|s| s.observer.spectral_radius.clone()),
+        },
+        "estimator": {
+            "method": estimator.method,
+            "response_length": estimator.response_length,
+            "samples": samples,
+            "residual_deviation": deviations,
+            "thresholds": estimator.thresholds,
+            "debounce": estimator.debounce,
+            "stuck_after": estimator.stuck_after,
+        },
+        "warnings": warnings,
+    });
+    pretty(&value)
+}
+
+/// The same object when there is no design.
+pub fn json_of_failure(asked: &ControlSpec, error: &DesignError) -> String {
+    let (feasible, blocks, advice) = match error {
+        DesignError::Infeasible(infeasibility) => (
+            Value::Bool(false),
+            infeasibility
+                .blocks
+                .iter()
+                .map(|block| json!({ "block": block.name.to_string(), "weight": block.weight }))
+                .collect(),
+            infeasibility.advice.as_slice(),
+        ),
+        DesignError::Uncertified(uncertified) => {
+            (Value::Bool(true), Vec::new(), uncertified.advice.as_slice())
+        }
+        DesignError::Request(_) | DesignError::Solver(_) => {
+            (Value::Null, Vec::new(), [].as_slice())
+        }
+    };
+    let advice: Vec<String> = advice.iter().map(ToString::to_string).collect();
+    pretty(&json!({
+        "feasible": feasible,
+        "certified": false,
+        "gamma": null,
+        "decay": asked.decay,
+        "spectral_radius": null,
+        "dwell_time_samples": null,
+        "lyapunov": asked.lyapunov,
+        "latency": asked.latency,
+        "blocks": blocks,
+        "advice": advice,
+        "reason": error.to_string(),
+    }))
+}
+
+/// JSON as this program prints it.
+pub fn pretty(value: &Value) -> String {
+    format!("{value:#}\n")
+}

@@ -1,0 +1,375 @@
+//! Properties of whole pages: well-formed, finite, escaped, small, for any sizes.
+
+use super::figure::{Figure, Mark, Series};
+use super::page::{Column, KeyNumber, Page, Row, Section, Table};
+use super::{demo, svg};
+use ftc_control::Controller;
+use ftc_control::parameters::{
+    Compensation, ControllerParameters, Estimator, EstimatorMethod, FeedbackGains, Gain, Limits,
+    Observer, ObserverKind, StateFeedback,
+};
+use ftc_design::{Design, FORMAT, Signal, Signals};
+use ftc_plant::scenario::{FaultEvent, FaultKind, ModeInterval, Waveform};
+use ftc_plant::{Mode, OperatingPoint, SwitchedPlant};
+use ftc_plant::{Scenario, Truth};
+use ftc_simulate::{PlantSimulator, Trajectory, Variant, run};
+use nalgebra::DMatrix;
+use proptest::prelude::*;
+use std::path::PathBuf;
+
+#[path = "../../../tests/common/mod.rs"]
+mod common;
+
+/// Breaks a page that escapes nothing.
+const HOSTILE: &str = "<script>alert(1)</script> & \"y'\" ]]> \u{1}";
+
+fn signals(count: usize, symbol: &str, unit: Option<&str>) -> Vec<Signal> {
+    (1..=count)
+        .map(|index| Signal {
+            name: format!("{symbol}[{index}]"),
+            unit: unit.map(String::from),
+            nominal: 1.0,
+            min: None,
+            max: None,
+        })
+        .collect()
+}
+
+/// The paper's example with the hand-made controller.
+fn paper(noise: f64) -> Design {
+    let controller = common::controller(common::Channel::State, noise);
+    Design {
+        format: FORMAT,
+        name: "paper".into(),
+        signals: Signals {
+            inputs: signals(2, "u", None),
+            outputs: signals(2, "y", None),
+            states: signals(2, "x", None),
+        },
+        controller,
+        truth: Truth::default(),
+        synthesis: None,
+        scenario: common::scenario(common::reference("levels"), noise, 1),
+    }
+}
+
+/// A plant of first-order lags in any size, with a proportional-integral controller and no estimator.
+fn lags(outputs: usize, disturbances: usize, steps: u64) -> Design {
+    let square = DMatrix::identity(outputs, outputs);
+    let mode = |pole: f64| Mode {
+        name: String::new(),
+        a: &square * pole,
+        b: &square * (1.0 - pole),
+        c: square.clone(),
+        e: DMatrix::from_element(outputs, disturbances, 0.1),
+        f: DMatrix::zeros(outputs, disturbances),
+        operating_point: OperatingPoint::zero(outputs, outputs, outputs),
+    };
+    let gains = FeedbackGains {
+        state_feedback: &square * -0.1,
+        integral: &square * 0.2,
+        feedforward: DMatrix::zeros(outputs, 0),
+        previous_input: DMatrix::zeros(outputs, 0),
+        anti_windup: DMatrix::zeros(outputs, outputs),
+        integral_inverse: &square * 5.0,
+        output_feedback: &square * -0.1,
+    };
+    let nothing = Gain(DMatrix::zeros(outputs, outputs));
+    let plant = SwitchedPlant {
+        sample_time: 0.01,
+        modes: vec![mode(0.5), mode(0.7)],
+    };
+    let at = |time: f64| time * steps as f64 * 0.01;
+    Design {
+        format: FORMAT,
+        name: "lags".into(),
+        signals: Signals {
+            inputs: signals(outputs, "u", Some("V")),
+            outputs: signals(outputs, "y", Some("A")),
+            states: signals(outputs, "x", None),
+        },
+        controller: ControllerParameters {
+            feedback: StateFeedback {
+                tracked: (0..outputs).collect(),
+                latency: 0,
+                resonators: vec![],
+                bumpless: false,
+                modes: vec![gains; 2],
+            },
+            observer: Observer {
+                kind: ObserverKind::Luenberger,
+                note: Some("no disturbance to decouple".into()),
+                gains: vec![Gain(&square * 0.4); 2],
+                decoupling: vec![vec![nothing; 2]; 2],
+            },
+            estimator: Estimator {
+                method: EstimatorMethod::None,
+                response_length: 0,
+                window: 0,
+                predictors: vec![],
+                adapt: false,
+                harmonics: None,
+                harmonic_transfers: vec![],
+                thresholds: vec![0.1; outputs],
+                debounce: 1,
+                stuck_after: 0,
+                leverage_limit: 100.0,
+                largest_fault: vec![1e6; outputs],
+            },
+            compensation: Compensation::None,
+            input_limits: vec![Limits::default(); outputs],
+            plant,
+        },
+        truth: Truth::default(),
+        synthesis: None,
+        scenario: Scenario {
+            steps,
+            noise: vec![0.02; outputs],
+            seed: 7,
+            schedule: vec![
+                ModeInterval { from: 0.0, mode: 0 },
+                ModeInterval {
+                    from: at(0.5),
+                    mode: 1,
+                },
+            ],
+            reference: vec![
+                Waveform::Square {
+                    amplitude: 1.0,
+                    period: at(0.4),
+                    offset: 0.0
+                };
+                outputs
+            ],
+            fault: vec![Waveform::ZERO; outputs],
+            events: vec![FaultEvent {
+                sensor: outputs - 1,
+                from: at(0.6),
+                until: at(0.8),
+                kind: FaultKind::Dropout,
+            }],
+            disturbance: vec![
+                Waveform::Sine {
+                    amplitude: 1.0,
+                    period: at(0.2),
+                    phase: 0.0,
+                    offset: 0.0
+                };
+                disturbances
+            ],
+        },
+    }
+}
+
+fn hostile(mut design: Design) -> Design {
+    design.name = HOSTILE.into();
+    let all = [
+        &mut design.signals.inputs,
+        &mut design.signals.outputs,
+        &mut design.signals.states,
+    ];
+    for signal in all.into_iter().flatten() {
+        signal.name = format!("{HOSTILE} {}", "long ".repeat(30));
+        signal.unit = Some(HOSTILE.into());
+    }
+    for mode in &mut design.controller.plant.modes {
+        mode.name = HOSTILE.into();
+    }
+    design.controller.observer.note = Some(HOSTILE.into());
+    design
+}
+
+fn simulate(design: &Design) -> Vec<Trajectory> {
+    let plant = PlantSimulator::new(design.controller.plant.clone(), design.scenario.clone());
+    let controller = Controller::new(design.controller.clone());
+    Variant::ALL
+        .map(|variant| run(&plant, &controller, variant))
+        .into()
+}
+
+/// Every number of every path, in document order.
+fn check_svg(document: &str) -> Vec<String> {
+    let tree =
+        roxmltree::Document::parse(document).unwrap_or_else(|error| panic!("{error}: {document}"));
+    let mut ids = Vec::new();
+    for node in tree.descendants() {
+        for attribute in node.attributes() {
+            let value = attribute.value();
+            assert!(
+                !value.contains("NaN") && !value.contains("inf"),
+                "{} = {value}",
+                attribute.name()
+            );
+        }
+        ids.extend(node.attribute("id").map(String::from));
+        if let Some(path) = node.attribute("d") {
+            assert!(
+                path.chars().all(|c| "MhvlHV-. 0123456789".contains(c)),
+                "{path}"
+            );
+        }
+    }
+    ids
+}
+
+/// Checks a page and returns it.
+fn check_page(page: &Page) -> String {
+    let html = page.render();
+    let mut ids = Vec::new();
+    let mut rest = html.as_str();
+    while let Some(start) = rest.find("<svg") {
+        let end = start + rest[start..].find("</svg>").expect("an svg that ends") + "</svg>".len();
+        ids.extend(check_svg(&rest[start..end]));
+        rest = &rest[end..];
+    }
+    let total = ids.len();
+    ids.sort();
+    ids.dedup();
+    assert_eq!(ids.len(), total, "every id occurs once");
+    assert_eq!(total, 3 * page.figures().count());
+    assert!(!html.contains("<script"), "user strings are escaped");
+    assert!(!html.contains('\u{1}'), "control characters are replaced");
+    for foreign in ["http://", "https://", "url(h", "@import"] {
+        let allowed = html.matches("http://www.w3.org/2000/svg").count();
+        let found = html.matches(foreign).count();
+        assert!(
+            found == 0 || (foreign == "http://" && found == allowed),
+            "{foreign}"
+        );
+    }
+    html
+}
+
+/// Pages for the browser test, written where it looks for them.
+fn keep(name: &str, design: &Design, trajectories: &[Trajectory]) {
+    let folder = PathBuf::from(env!("CARGO_MANIFEST_DIR"))
+        .join("../../target/pages")
+        .join(name);
+    std::fs::create_dir_all(&folder).expect("a folder");
+    for (name, text) in super::files(design, trajectories, &[]) {
+        if name.ends_with(".svg") {
+            check_svg(&text);
+        }
+        std::fs::write(folder.join(name), text).expect("a file");
+    }
+}
+
+#[test]
+fn the_papers_example_makes_a_whole_page() {
+    for (name, noise) in [("paper", 0.0), ("noisy", 0.005)] {
+        let design = paper(noise);
+        let trajectories = simulate(&design);
+        let page = demo::page(&design, &trajectories, &[]);
+        assert_eq!(page.figures().count(), 2 + 2 + 2 + 2 + 1);
+        let html = check_page(&page);
+        assert!(
+            html.contains("4 of 4")
+                && html.contains("fault present")
+                && html.contains("mode 2: second")
+        );
+        assert!(html.len() < 1_000_000, "{}", html.len());
+        keep(name, &design, &trajectories);
+    }
+}
+
+#[test]
+fn any_size_makes_a_page_below_a_megabyte() {
+    for (outputs, disturbances, steps) in [(1, 0, 1), (1, 0, 300), (12, 3, 20_000)] {
+        let design = lags(outputs, disturbances, steps);
+        let trajectories = simulate(&design);
+        let html = check_page(&demo::page(&design, &trajectories, &[]));
+        assert!(html.len() < 1_000_000, "{} bytes", html.len());
+        keep(&format!("lags-{outputs}-{steps}"), &design, &trajectories);
+    }
+}
+
+#[test]
+fn user_strings_cannot_break_out() {
+    let design = hostile(paper(0.005));
+    let trajectories = simulate(&design);
+    let html = check_page(&demo::page(&design, &trajectories, &[]));
+    assert!(html.contains("&lt;script&gt;"));
+    keep("hostile", &design, &trajectories);
+}
+
+#[test]
+fn nothing_simulated_is_said_so() {
+    let html = check_page(&demo::page(&paper(0.0), &[], &[]));
+    assert!(html.contains("Nothing was simulated."));
+}
+
+#[test]
+fn a_lost_sensor_leaves_a_gap_in_its_curve() {
+    let design = lags(1, 0, 300);
+    let trajectories = simulate(&design);
+    let page = demo::page(&design, &trajectories, &[]);
+    let document = svg::document(page.figures().next().expect("an output"));
+    let tree = roxmltree::Document::parse(&document).expect("well-formed");
+    let measured = tree
+        .descendants()
+        .filter(|node| node.attribute("class") == Some("ink-faint"))
+        .filter_map(|node| node.attribute("d"))
+        .max_by_key(|path| path.len())
+        .expect("the measured curve");
+    assert_eq!(measured.matches('M').count(), 2, "{measured}");
+}
+
+#[test]
+fn a_curve_that_runs_away_does_not_flatten_the_others() {
+    let calm: Vec<_> = (0..100)
+        .map(|k| [k as f64, (k as f64 / 10.0).sin()])
+        .collect();
+    let wild: Vec<_> = (0..100).map(|k| [k as f64, 1.5f64.powi(k * 10)]).collect();
+    let figure = Figure::new("f", "t", "x", "y")
+        .with(Series::new("wild", wild).secondary())
+        .with(Series::new("calm", calm));
+    let document = svg::document(&figure);
+    check_svg(&document);
+    assert!(document.contains("wild leaves the picture"));
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(64))]
+    #[test]
+    fn any_figure_is_well_formed_and_finite(
+        values in prop::collection::vec(prop_oneof![8 => any::<f64>(), 8 => -1.0..1.0f64, 1 => Just(f64::NAN)], 0..3000),
+        words in any::<String>(),
+        step in any::<bool>(),
+        spans in prop::collection::vec(0.0..3000.0f64, 0..20),
+    ) {
+        let points = values.iter().enumerate().map(|(k, v)| [k as f64, *v]).collect();
+        let series = Series { step, ..Series::new(words.clone(), points) };
+        let marks: Vec<Mark> = spans.iter().map(|at| Mark { at: *at, label: words.clone() }).collect();
+        let mut intervals: Vec<[f64; 2]> = spans.iter().map(|at| [*at, at + 20.0]).collect();
+        intervals.sort_by(|a, b| a[0].total_cmp(&b[0]));
+        let figure = Figure::new("figure", &words, &words, &words)
+            .with(series)
+            .shade(&words, intervals)
+            .mark(&marks);
+        check_svg(&svg::document(&figure));
+    }
+
+    #[test]
+    fn any_words_are_escaped_in_every_block(words in any::<String>()) {
+        let words = words + HOSTILE;
+        let table = Table {
+            caption: words.clone(),
+            columns: vec![Column::name(&words), Column::number(&words), Column::words(&words)],
+            rows: vec![Row { cells: vec![words.clone(); 3], ..Row::default() }],
+            notes: vec![words.clone()],
+        };
+        let page = Page {
+            title: words.clone(),
+            lead: words.clone(),
+            key_numbers: vec![KeyNumber { value: words.clone(), meaning: words.clone() }],
+            sections: vec![
+                Section::new(&words)
+                    .paragraph(&words)
+                    .with(super::page::Block::Table(table))
+                    .with(super::page::Block::Facts(vec![(words.clone(), words.clone())])),
+            ],
+            footer: words,
+        };
+        check_page(&page);
+    }
+}

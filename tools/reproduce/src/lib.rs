@@ -1,0 +1,67 @@
+//! `reproduce`: the paper's two experiments, each as a page with its numbers beside it.
+//!
+//! Both begin with a design file of examples/, so that what a page shows can be changed and run
+//! again by whoever reads it. Every number on a page is computed in the run.
+
+mod converter;
+mod experiment;
+mod paper;
+
+use report::page::Page;
+use serde_json::Value;
+
+/// What can be reproduced.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Experiment {
+    /// Section VII-A: the switched example, in every variant.
+    Paper,
+    /// Section VII-B: the AC/DC converter, against model predictive control.
+    Converter,
+}
+
+/// What an experiment leaves behind.
+struct Findings {
+    /// Begins the names of the files.
+    name: &'static str,
+    page: Page,
+    numbers: Value,
+    /// One row per output and run.
+    table: Vec<u8>,
+    /// What to print.
+    summary: String,
+}
+
+/// Is told what is going on now.
+pub type Progress<'a> = &'a dyn Fn(&'static str);
+
+/// An experiment that was run.
+pub struct Reproduction {
+    /// Begins the names of the files.
+    pub name: &'static str,
+    /// Name and contents of `NAME.html`, `NAME.json` and `NAME.csv`.
+    pub files: Vec<(String, Vec<u8>)>,
+    /// The most important numbers as a table for a person.
+    pub summary: String,
+}
+
+/// Runs an experiment.
+///
+/// # Errors
+/// One sentence: a design that could not be made.
+pub fn run(experiment: Experiment, progress: Progress) -> Result<Reproduction, String> {
+    let findings = match experiment {
+        Experiment::Paper => paper::run(progress)?,
+        Experiment::Converter => converter::run(progress)?,
+    };
+    let name = findings.name;
+    let numbers = format!("{:#}\n", findings.numbers);
+    Ok(Reproduction {
+        name,
+        files: vec![
+            (format!("{name}.html"), findings.page.render().into_bytes()),
+            (format!("{name}.json"), numbers.into_bytes()),
+            (format!("{name}.csv"), findings.table),
+        ],
+        summary: findings.summary,
+    })
+}
