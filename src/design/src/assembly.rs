@@ -3,8 +3,8 @@
 use super::commissioning::{self, Database, LONGEST_RESPONSE, RecordedDisturbance};
 use super::harmonics;
 use super::{
-    ControlSpec, Design, DesignError, FORMAT, ObserverSpec, Signal, Signals, check_controllable,
-    synthesise,
+    ControlSpec, Design, DesignError, FORMAT, ObserverSpec, Run, Signal, Signals,
+    check_controllable, synthesise_with,
 };
 use ftc_control::ControllerParameters;
 use ftc_control::parameters::{
@@ -144,17 +144,26 @@ const MOST_COEFFICIENTS: usize = 2000;
 /// # Errors
 /// [`DesignError::Request`] where the request is ill-formed, else what the synthesis says.
 pub fn assemble(request: Request) -> Result<Design, DesignError> {
+    assemble_with(request, &Run::default())
+}
+
+/// [`assemble`] with a chosen solver and someone who watches.
+///
+/// # Errors
+/// As [`assemble`].
+pub fn assemble_with(request: Request, run: &Run) -> Result<Design, DesignError> {
     let dims = Dimensions::check(&request.plant).map_err(DesignError::Request)?;
     let asked = request.control.check(dims);
     asked.map_err(DesignError::Request)?;
     let estimator = estimator(&request, dims).map_err(DesignError::Request)?;
     let scaling = scaling(&request.signals);
     check_controllable(&request.plant, &request.control, &scaling).map_err(DesignError::Request)?;
-    let synthesis = synthesise(
+    let synthesis = synthesise_with(
         &request.plant,
         &request.control,
         &request.observer,
         &scaling,
+        run,
     )?;
     let input_limits = limits(&request.signals.inputs);
     let feedback = feedback(

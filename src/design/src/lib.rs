@@ -20,6 +20,8 @@ pub mod lmi;
 mod lyapunov;
 pub mod observer;
 mod record;
+#[cfg(feature = "solver")]
+mod solver;
 mod spec;
 pub mod state_feedback;
 mod units;
@@ -36,12 +38,14 @@ pub use controllability::check_controllable;
 pub use lyapunov::{DwellTime, Lyapunov};
 pub use observer::{ObserverCertificate, ObserverDesign};
 pub use record::{Design, FORMAT, Signal, Signals};
+#[cfg(feature = "solver")]
+pub use solver::{Run, Solver, Step};
 pub use spec::{ControlSpec, Objective, ObserverChoice, ObserverSpec};
 pub use state_feedback::{ModeGains, StateFeedback};
 pub use units::Units;
 pub use verdict::{
-    Advice, BlockKind, BlockName, ConflictingBlock, DesignError, Infeasibility, SolverFailure,
-    Uncertified,
+    Advice, BlockKind, BlockName, ConflictingBlock, DesignError, Infeasibility, Partial,
+    SolverFailure, Uncertified,
 };
 
 /// A certified state feedback and a certified observer for one plant.
@@ -76,10 +80,34 @@ pub fn synthesise(
     observer: &ObserverSpec,
     scaling: &Scaling,
 ) -> Result<Synthesis, DesignError> {
-    Ok(Synthesis {
-        state_feedback: state_feedback::synthesise(plant, control, scaling)?,
-        observer: observer::synthesise(plant, observer, scaling)?,
-    })
+    synthesise_with(plant, control, observer, scaling, &Run::default())
+}
+
+/// [`synthesise`] with a chosen solver and someone who watches.
+///
+/// # Errors
+/// As [`synthesise`]; [`DesignError::Partial`] where one of the two was found.
+#[cfg(feature = "solver")]
+pub fn synthesise_with(
+    plant: &SwitchedPlant,
+    control: &ControlSpec,
+    observer: &ObserverSpec,
+    scaling: &Scaling,
+    run: &Run,
+) -> Result<Synthesis, DesignError> {
+    let feedback = state_feedback::synthesise_with(plant, control, scaling, run);
+    let observer = observer::synthesise(plant, observer, scaling);
+    match (feedback, observer) {
+        (Ok(state_feedback), Ok(observer)) => Ok(Synthesis {
+            state_feedback,
+            observer,
+        }),
+        (Err(error @ DesignError::Request(_)), _) | (_, Err(error @ DesignError::Request(_))) => {
+            Err(error)
+        }
+        (Err(error), observer) => Err(error.with_parts(None, observer.ok())),
+        (Ok(feedback), Err(error)) => Err(error.with_parts(Some(feedback), None)),
+    }
 }
 
 /// The Moore-Penrose inverse; singular values below `tolerance` times the largest count as zero.

@@ -5,7 +5,11 @@
 #[cfg(feature = "solver")]
 mod advice;
 #[cfg(feature = "solver")]
+mod direct;
+#[cfg(feature = "solver")]
 mod frame;
+#[cfg(feature = "solver")]
+mod riccati;
 #[cfg(feature = "solver")]
 mod structured;
 #[cfg(feature = "solver")]
@@ -14,7 +18,7 @@ mod synthesis;
 mod theorem;
 
 #[cfg(feature = "solver")]
-pub use synthesis::synthesise;
+pub use synthesis::{synthesise, synthesise_with};
 
 use super::certificate::{self, CertificateError, ControlCertificate};
 use super::{ControlSpec, DwellTime, pseudo_inverse};

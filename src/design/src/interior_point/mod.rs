@@ -37,7 +37,7 @@ pub(crate) struct Solution {
     pub point: Point,
     /// The scalar unknown.
     pub value: f64,
-    /// No value is above this, in the method's view; infinite before the multipliers are feasible.
+    /// No value is above this, in the method's view.
     pub bound: f64,
     /// Trace of the multiplier of each block.
     pub multipliers: Vec<f64>,
@@ -66,7 +66,8 @@ struct Residuals {
     trace: f64,
     dual: Gradient,
     primal_size: f64,
-    dual_size: f64,
+    /// Rows of all blocks and bounds.
+    rows: usize,
     /// Mean product of slack and multiplier.
     complementarity: f64,
     bound: f64,
@@ -89,8 +90,8 @@ const START: f64 = 10.0;
 /// Largest residual of the inequalities that counts as none.
 const PRIMAL: f64 = 1e-8;
 
-/// Largest residual of the multipliers that counts as none.
-const DUAL: f64 = 1e-6;
+/// Complementarity this far below the gap that is asked for brings nothing any more.
+const EXHAUSTED: f64 = 1e-3;
 
 /// Maximises the scalar unknown from `symmetric = I`, `full = 0`, `scalar = 0`; `watch` is told of
 /// every iteration. `None` where not a single step could be made.
@@ -106,7 +107,6 @@ pub(crate) fn maximise(
         let residuals = iterate.residuals(problem);
         let solution = iterate.solution(&residuals, &settings, iteration);
         let stop = solution.converged;
-        if std::env::var_os("IPM_TRACE").is_some() { eprintln!("{iteration} value {:.8e} bound {:.8e} mu {:.2e} p {:.1e} d {:.1e}", solution.value, residuals.bound, residuals.complementarity, residuals.primal_size, residuals.dual_size); }
         if solution.feasible || best.is_none() {
             best = Some(solution);
         }
@@ -198,7 +198,7 @@ impl Iterate {
             .fold(trace.abs(), f64::max);
         Residuals {
             primal_size,
-            dual_size: dual.amax(),
+            rows: problem.rows(),
             complementarity: products / problem.rows() as f64,
             blocks,
             bounds,
@@ -209,17 +209,20 @@ impl Iterate {
     }
 
     fn solution(&self, residuals: &Residuals, settings: &Settings, iterations: usize) -> Solution {
-        let (value, bound) = (self.point.scalar, residuals.bound);
+        let value = self.point.scalar;
         let feasible = residuals.primal_size < PRIMAL;
-        let bounded = residuals.dual_size < DUAL;
-        let gap = (bound - value).abs();
-        let closed = gap < settings.gap * value.abs() || gap < settings.absolute_gap;
+        // What the multipliers still lack, weighed with the unknowns, may move the bound.
+        let bound = residuals.bound + residuals.dual.weighed(&self.point);
+        let allowed = settings.absolute_gap.max(settings.gap * value.abs());
+        let closed = bound - value < allowed;
+        let rows = residuals.rows as f64;
+        let exhausted = residuals.complementarity * rows < EXHAUSTED * allowed;
         Solution {
             point: self.point.clone(),
             value,
-            bound: if bounded { bound } else { f64::INFINITY },
+            bound,
             multipliers: self.multipliers.iter().map(DMatrix::trace).collect(),
-            converged: feasible && (bounded && closed || value > settings.enough),
+            converged: feasible && (closed || exhausted || value > settings.enough),
             feasible,
             iterations,
         }

@@ -266,15 +266,19 @@ impl<'a> Assembly<'a> {
     }
 }
 
-/// Factors a matrix that rounding may have robbed of its definiteness: its diagonal is raised by a
-/// fraction `least`, and by more where that is not enough.
+/// Factors a matrix that rounding may have robbed of its definiteness, or that is singular where an
+/// unknown has no effect: its diagonal is raised by a fraction `least`, and where that is not enough by
+/// more, and by some of its largest entry.
 fn regularised(matrix: DMatrix<f64>, least: f64) -> Option<Triangular> {
     const LARGEST: f64 = 1e-6;
+    const SMALL: f64 = 1e-2;
+    let largest = matrix.diagonal().amax();
     let mut raise = least;
     while raise <= LARGEST {
         let mut raised = matrix.clone();
         for k in 0..raised.nrows() {
-            raised[(k, k)] *= 1.0 + raise;
+            let floor = if raise > least { SMALL * largest } else { 0.0 };
+            raised[(k, k)] += raise * (raised[(k, k)] + floor);
         }
         if let Some(factor) = Triangular::factor(raised) {
             return Some(factor);

@@ -18,6 +18,7 @@ use crate::interior_point::{
     Block, Bound, Congruence, Problem, Product, Settings, Solution, maximise,
 };
 use crate::lmi::Margin;
+use crate::solver::{Run, Step};
 use crate::verdict::{BlockKind, BlockName, SolverFailure};
 use crate::{ControlSpec, Lyapunov, pseudo_inverse};
 use nalgebra::DMatrix;
@@ -45,6 +46,7 @@ struct Theorem<'a> {
     spec: &'a ControlSpec,
     group: &'a [usize],
     scalar: Scalar,
+    run: &'a Run<'a>,
     problem: Problem,
     names: Vec<BlockName>,
 }
@@ -82,6 +84,7 @@ impl<'a> Theorem<'a> {
         spec: &'a ControlSpec,
         group: &'a [usize],
         scalar: Scalar,
+        run: &'a Run<'a>,
     ) -> Self {
         let (order, inputs) = models[0].b.shape();
         let rows = match spec.lyapunov {
@@ -93,6 +96,7 @@ impl<'a> Theorem<'a> {
             spec,
             group,
             scalar,
+            run,
             problem: Problem {
                 order,
                 symmetric: spec.lyapunov.matrices(group.len()),
@@ -250,8 +254,19 @@ impl<'a> Theorem<'a> {
             .collect()
     }
 
-    fn solve(&self, settings: Settings) -> Result<Solution, SolverFailure> {
-        let found = maximise(&self.problem, settings, &mut |_| ());
+    fn solve(&self, what: &'static str, settings: Settings) -> Result<Solution, SolverFailure> {
+        const USUAL: usize = 25;
+        let (unknowns, mode) = (self.problem.reduced(), self.group[0] + 1);
+        let step = |number| Step::Iteration {
+            number,
+            usual: USUAL.max(number + 1),
+            unknowns,
+            what,
+            mode,
+        };
+        let found = maximise(&self.problem, settings, &mut |number| {
+            (self.run.watch)(step(number))
+        });
         found.ok_or(SolverFailure::NumericalTrouble)
     }
 }
@@ -261,16 +276,20 @@ pub(super) fn stabilise(
     models: &[AugmentedMode],
     spec: &ControlSpec,
     group: &[usize],
+    run: &Run,
 ) -> Result<(Margin, Vec<Part>), SolverFailure> {
-    let mut theorem = Theorem::new(models, spec, group, Scalar::Margin);
+    let mut theorem = Theorem::new(models, spec, group, Scalar::Margin, run);
     theorem.require_decay();
     theorem.problem.total = Some((theorem.problem.symmetric * theorem.problem.order) as f64);
-    let solution = theorem.solve(Settings {
-        gap: 1e-3,
-        absolute_gap: 1e-9,
-        enough: f64::INFINITY,
-        iterations: 60,
-    })?;
+    let solution = theorem.solve(
+        "largest margin",
+        Settings {
+            gap: 1e-3,
+            absolute_gap: 1e-10,
+            enough: f64::INFINITY,
+            iterations: 60,
+        },
+    )?;
     if !solution.converged {
         return Err(SolverFailure::NumericalTrouble);
     }
@@ -296,18 +315,22 @@ pub(super) fn least_level(
     spec: &ControlSpec,
     group: &[usize],
     floor: f64,
+    run: &Run,
 ) -> Result<LeastLevel, SolverFailure> {
-    let mut theorem = Theorem::new(models, spec, group, Scalar::Level);
+    let mut theorem = Theorem::new(models, spec, group, Scalar::Level, run);
     theorem.require_attenuation(0.0);
     theorem.require_decay();
     theorem.require_reach(REACH);
     theorem.require_at_most(1.0 / floor);
-    let solution = theorem.solve(Settings {
-        gap: 1e-6,
-        absolute_gap: 0.0,
-        enough: f64::INFINITY,
-        iterations: 80,
-    })?;
+    let solution = theorem.solve(
+        "least gamma",
+        Settings {
+            gap: 1e-6,
+            absolute_gap: 0.0,
+            enough: f64::INFINITY,
+            iterations: 80,
+        },
+    )?;
     if !(solution.feasible && solution.value > 0.0) {
         return Err(SolverFailure::NumericalTrouble);
     }
@@ -325,17 +348,21 @@ pub(super) fn centred(
     spec: &ControlSpec,
     group: &[usize],
     level: f64,
+    run: &Run,
 ) -> Result<Vec<Part>, SolverFailure> {
-    let mut theorem = Theorem::new(models, spec, group, Scalar::Margin);
+    let mut theorem = Theorem::new(models, spec, group, Scalar::Margin, run);
     theorem.require_attenuation(1.0 / level);
     theorem.require_decay();
     theorem.require_reach(ROOM);
-    let solution = theorem.solve(Settings {
-        gap: 1e-2,
-        absolute_gap: 0.0,
-        enough: f64::INFINITY,
-        iterations: 60,
-    })?;
+    let solution = theorem.solve(
+        "centred gains",
+        Settings {
+            gap: 1e-2,
+            absolute_gap: 0.0,
+            enough: f64::INFINITY,
+            iterations: 60,
+        },
+    )?;
     match solution.feasible && solution.value > 0.0 {
         true => theorem.read(&solution),
         false => Err(SolverFailure::NumericalTrouble),

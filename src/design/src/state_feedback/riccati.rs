@@ -1,0 +1,175 @@
+//! The least level of one mode without the decay inequality, and a level near it with it, by
+//! game Riccati equations.
+//!
+//! With no weight between state and input (`H'D = 0`) and a weight on every input, `g` is reached
+//! when `X = H'H + A'X (I + G X)^-1 A`, `G = B (D'D)^-1 B' - E E'/g`, has a stabilising solution `X >= 0`
+//! with `g I - E'XE > 0`; `K = -(D'D)^-1 B'X (I + G X)^-1 A` and `S = X^-1`. On `A/a`, `B/a` with `a < 1`
+//! the same `X` proves the decay rate `a` as well, at a larger `g`.
+
+use super::frame::Part;
+use crate::augmented::AugmentedMode;
+use crate::certificate::FactoredLyapunov;
+use nalgebra::DMatrix;
+
+/// Relative accuracy of a level.
+const ACCURACY: f64 = 1e-5;
+
+/// Steps between the asked rate and 1 in the search for the slowest rate that proves the asked one.
+const HALVINGS: usize = 5;
+
+/// A level and what proves it.
+pub(super) struct Game {
+    /// `g` that is proved.
+    pub level: f64,
+    /// No `g` is below this, with or without decay.
+    pub bound: f64,
+    /// Gain and Lyapunov matrix.
+    pub part: Part,
+}
+
+/// One mode's matrices.
+struct Data<'a> {
+    model: &'a AugmentedMode,
+    /// `B (D'D)^-1`.
+    acting: DMatrix<f64>,
+    /// `H'H`.
+    cost: DMatrix<f64>,
+}
+
+/// A solution at one level.
+struct Solved {
+    value: DMatrix<f64>,
+    gain: DMatrix<f64>,
+}
+
+/// A level near the least one at which `decay` is proved as well; `None` where the equations do not apply
+/// or have no solution.
+pub(super) fn game(model: &AugmentedMode, mode: usize, decay: f64) -> Option<Game> {
+    let weight = model.d.tr_mul(&model.d);
+    let crossed = model.h.tr_mul(&model.d).amax() > 0.0;
+    let inverse = weight.cholesky().filter(|_| !crossed)?.inverse();
+    let data = Data {
+        model,
+        acting: &model.b * inverse,
+        cost: model.h.tr_mul(&model.h),
+    };
+    let (least, free) = data.least(1.0, None)?;
+    if data.decays(&free, decay) {
+        return data.finish(least, least, free, mode);
+    }
+    let (level, solved) = data.least(decay, Some(least))?;
+    let mut best = (level, solved);
+    let (mut proved, mut failed) = (decay, 1.0);
+    for _ in 0..HALVINGS {
+        let rate = 0.5 * (proved + failed);
+        match data.least(rate, Some(least)) {
+            Some((level, solved)) if level <= best.0 && data.decays(&solved, decay) => {
+                proved = rate;
+                best = (level, solved);
+            }
+            _ => failed = rate,
+        }
+    }
+    data.finish(best.0, least, best.1, mode)
+}
+
+impl Data<'_> {
+    /// The least level on `A/rate`, `B/rate`, raised by its accuracy, and the solution there.
+    fn least(&self, rate: f64, above: Option<f64>) -> Option<(f64, Solved)> {
+        const WIDEST: f64 = 1e24;
+        let (mut low, mut high) = match above {
+            Some(level) => (level, level * 1.1),
+            None => (0.0, 1.0),
+        };
+        let mut solved = self.solve(rate, high);
+        while solved.is_none() {
+            low = high;
+            high *= 4.0;
+            if high > WIDEST {
+                return None;
+            }
+            solved = self.solve(rate, high);
+        }
+        while low == 0.0 || high > low * (1.0 + ACCURACY) {
+            let middle = match low {
+                0.0 => high / 4.0,
+                _ => (low * high).sqrt(),
+            };
+            if middle < 1e-12 {
+                break;
+            }
+            match self.solve(rate, middle) {
+                Some(better) => (high, solved) = (middle, Some(better)),
+                None => low = middle,
+            }
+        }
+        let raised = high * (1.0 + 10.0 * ACCURACY);
+        Some((raised, self.solve(rate, raised).or(solved)?))
+    }
+
+    /// The stabilising solution at a level, by doubling.
+    fn solve(&self, rate: f64, level: f64) -> Option<Solved> {
+        const DOUBLINGS: usize = 40;
+        let model = self.model;
+        let size = model.a.nrows();
+        let identity = DMatrix::<f64>::identity(size, size);
+        let a = &model.a / rate;
+        let game = &self.acting * model.b.transpose() / rate.powi(2)
+            - &model.e * model.e.transpose() / level;
+        let (mut transition, mut reach, mut value) = (a.clone(), game.clone(), self.cost.clone());
+        let mut settled = false;
+        for _ in 0..DOUBLINGS {
+            let factor = (&identity + &reach * &value).lu();
+            let through = factor.solve(&transition)?;
+            let growth = transition.tr_mul(&(&value * &through));
+            reach += &transition * factor.solve(&(&reach * transition.transpose()))?;
+            transition = &transition * through;
+            reach = 0.5 * (&reach + reach.transpose());
+            value += 0.5 * (&growth + growth.transpose());
+            if !value.iter().all(|entry| entry.is_finite()) {
+                return None;
+            }
+            if growth.norm() <= 1e-13 * value.norm() {
+                settled = true;
+                break;
+            }
+        }
+        if !settled {
+            return None;
+        }
+        let room = DMatrix::identity(model.e.ncols(), model.e.ncols()) * level
+            - model.e.tr_mul(&(&value * &model.e));
+        room.cholesky()?;
+        value.clone().cholesky()?;
+        let ahead = &value * (&identity + &game * &value).lu().solve(&a)?;
+        let gain = -self.acting.tr_mul(&ahead) / rate;
+        Some(Solved { value, gain })
+    }
+
+    /// Whether the closed loop shrinks by `decay` in the norm of this solution, with room for rounding.
+    fn decays(&self, solved: &Solved, decay: f64) -> bool {
+        let closed = &self.model.a + &self.model.b * &solved.gain;
+        let left = decay.powi(2) * (1.0 - 1e-9) * &solved.value
+            - closed.tr_mul(&(&solved.value * &closed));
+        left.cholesky().is_some()
+    }
+
+    fn finish(&self, level: f64, bound: f64, solved: Solved, mode: usize) -> Option<Game> {
+        // S = X^-1 = L^-T L^-1.
+        let lower = solved.value.cholesky()?.unpack();
+        let basis = lower.transpose().try_inverse()?;
+        let size = basis.nrows();
+        Some(Game {
+            level,
+            bound: bound / (1.0 + 11.0 * ACCURACY),
+            part: Part {
+                mode,
+                gain: solved.gain,
+                lyapunov: FactoredLyapunov {
+                    basis,
+                    core: DMatrix::identity(size, size),
+                },
+            },
+        })
+    }
+}
