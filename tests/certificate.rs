@@ -17,6 +17,7 @@ fn designed(lyapunov: Lyapunov, latency: usize) -> (SwitchedPlant, Synthesis) {
         kind: ObserverChoice::Auto,
         decay: 0.5,
         lyapunov,
+        noise: Vec::new(),
     };
     let control: ControlSpec = paper_spec(latency, 0.9, lyapunov);
     let synthesis = synthesise(&plant, &control, &observer, &Scaling::automatic(&plant)).unwrap();

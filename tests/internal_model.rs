@@ -69,6 +69,7 @@ fn design(channel: Channel, control: ControlSpec) -> Design {
             kind: ObserverChoice::Auto,
             decay: 0.7,
             lyapunov: control.lyapunov,
+            noise: Vec::new(),
         },
         estimator: EstimatorSpec {
             method: EstimatorMethod::Reference,

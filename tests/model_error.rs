@@ -65,6 +65,7 @@ fn design(model: &SwitchedPlant, truth: &SwitchedPlant, noise: f64) -> Design {
         kind: ObserverChoice::Auto,
         decay: 0.7,
         lyapunov: ftc_design::Lyapunov::Common,
+        noise: Vec::new(),
     };
     assemble(Request {
         name: "wrong".into(),

@@ -15,6 +15,7 @@ fn spec(kind: ObserverChoice, decay: f64, lyapunov: Lyapunov) -> ObserverSpec {
         kind,
         decay,
         lyapunov,
+        noise: Vec::new(),
     }
 }
 

@@ -60,6 +60,7 @@ fn timed(plant: &SwitchedPlant, lyapunov: Lyapunov) -> (f64, &'static str) {
         kind: ObserverChoice::Auto,
         decay: 0.97,
         lyapunov,
+        noise: Vec::new(),
     };
     let begin = Instant::now();
     let scaling = Scaling::automatic(plant);

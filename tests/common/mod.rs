@@ -171,6 +171,8 @@ pub fn controller(channel: Channel, noise: f64) -> ControllerParameters {
             note: None,
             gains: observer_gains,
             decoupling: vec![vec![Gain(decoupling.clone()); 2]; 2],
+            lost: Vec::new(),
+            minimum_dwell: 0,
         },
         estimator: Estimator {
             method: EstimatorMethod::Reference,

@@ -121,6 +121,7 @@ pub fn design(dice: &mut Dice) -> Design {
                 kind: ObserverChoice::Auto,
                 decay: 0.9,
                 lyapunov: Lyapunov::Dwell,
+                noise: Vec::new(),
             },
             estimator: EstimatorSpec {
                 method: EstimatorMethod::Reference,

@@ -104,6 +104,8 @@ pub enum ObserverKind {
     Uio,
     /// Luenberger observer.
     Luenberger,
+    /// Kalman filter in correction form: no injection, one `H_j` whatever mode was left.
+    Kalman,
 }
 
 /// The observer (11), per mode and per pair of modes.
@@ -117,6 +119,23 @@ pub struct Observer {
     pub gains: Vec<Gain>,
     /// `H_ij` of (14): `decoupling[i][j]` corrects on entering mode `j` from mode `i` (n x p each).
     pub decoupling: Vec<Vec<Gain>>,
+    /// Gains for each set of lost sensors from whose rest the state can be observed, the smallest
+    /// sets first; a set that is not listed is not served. With none lost, the gains above are used.
+    #[serde(default)]
+    pub lost: Vec<LostSet>,
+    /// Samples for which a set of lost sensors must last before it may change; 0: it may change at
+    /// every sample.
+    #[serde(default)]
+    pub minimum_dwell: usize,
+}
+
+/// How to observe without some sensors: `x_hat = prior + H (y - C prior)`, no injection.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct LostSet {
+    /// Which sensors (rows of `C`, from 0) are lost, in ascending order; never empty.
+    pub sensors: Vec<usize>,
+    /// `H` of each mode (n x p each); the columns of the lost sensors are zero.
+    pub correction: Vec<Gain>,
 }
 
 /// A matrix on its own, written as its rows.

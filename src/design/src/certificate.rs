@@ -18,12 +18,12 @@ pub use enclosure::Enclosure;
 
 use super::augmented::{AugmentedMode, augment, scaled};
 use super::lyapunov::all_pairs;
-use super::observer::ObserverDesign;
+use super::observer::{self, ObserverDesign, corrected_error};
 use super::state_feedback::{ModeGains, StateFeedback};
 use super::units::power_of_two;
 use super::verdict::{BlockKind, BlockName};
 use super::{ControlSpec, DwellTime, Lyapunov, Units};
-use ftc_control::parameters::Gain;
+use ftc_control::parameters::{Gain, ObserverKind};
 use ftc_plant::rows;
 use ftc_plant::{Dimensions, SwitchedPlant};
 use nalgebra::DMatrix;
@@ -73,7 +73,7 @@ pub enum CertificateError {
 }
 
 /// Proves a claim about a mode and its successor (indices from 0).
-fn prove(
+pub(crate) fn prove(
     claim: &Enclosure,
     kind: BlockKind,
     mode: usize,
@@ -298,12 +298,24 @@ pub(crate) fn scaled_gain(gains: &ModeGains, units: &Units, spec: &ControlSpec) 
     gain
 }
 
-/// The error dynamics `T_ij A_i - K_i C_i` of an observer in its certificate's units, enclosed.
-fn error_dynamics(plant: &SwitchedPlant, design: &ObserverDesign, i: usize, j: usize) -> Enclosure {
+/// A matrix of given numbers in units (powers of two), enclosed.
+pub(crate) fn scaled_plant(matrix: &DMatrix<f64>, rows: &[f64], columns: &[f64]) -> Enclosure {
+    Enclosure::rounded(scaled(matrix, rows, columns))
+}
+
+/// The error dynamics `T_ij A_i - K_i C_i` of an observer in its certificate's units, enclosed; of a
+/// Kalman filter the error of the prediction, `A_i - A_i H_i C_i`, whatever mode follows.
+pub(crate) fn error_dynamics(
+    plant: &SwitchedPlant,
+    design: &ObserverDesign,
+    i: usize,
+    j: usize,
+) -> Enclosure {
+    if design.observer.kind == ObserverKind::Kalman {
+        return corrected_error(plant, design, i, &design.observer.decoupling[i][i]);
+    }
     let (states, outputs) = (&design.certificate.states, &design.certificate.outputs);
-    let matrix = |matrix: &DMatrix<f64>, rows: &[f64], columns: &[f64]| {
-        Enclosure::rounded(scaled(matrix, rows, columns))
-    };
+    let matrix = scaled_plant;
     let (own, next) = (&plant.modes[i], &plant.modes[j]);
     let a = matrix(&own.a, states, states);
     let gain = matrix(&design.observer.gains[i].0, states, outputs);
@@ -315,7 +327,7 @@ fn error_dynamics(plant: &SwitchedPlant, design: &ObserverDesign, i: usize, j: u
 
 /// `[f P_i (P_j N)'; . P_j]`: the function of mode `j` after a sample is below `f` times that of
 /// mode `i` before it.
-fn growth_block(
+pub(crate) fn growth_block(
     error: &Enclosure,
     own: &Enclosure,
     next: &Enclosure,
@@ -344,6 +356,7 @@ pub(crate) fn verify_observer(
         let block = growth_block(&error, lyapunov(i), lyapunov(j), &squared);
         prove(&block, BlockKind::ObserverDecay, i, j)?;
     }
+    observer::verify_lost(plant, design)?;
     let Some(dwell) = &design.dwell else {
         return Ok(());
     };
@@ -434,6 +447,13 @@ fn check_observer_sizes(
         && observer.decoupling.iter().all(|row| row.len() == modes)
         && observer.gains.iter().all(fits)
         && observer.decoupling.iter().flatten().all(fits);
+    let one_index = |(i, gain): (usize, &Gain)| {
+        let mut entered = observer.decoupling.iter().map(|row| &row[i]);
+        gain.0.iter().all(|&k| k == 0.0) && entered.all(|h| *h == observer.decoupling[i][i])
+    };
+    let form_fits = !gains_fit
+        || observer.kind != ObserverKind::Kalman
+        || observer.gains.iter().enumerate().all(one_index);
     let matrices_fit = certificate.lyapunov.len() == design.spec.lyapunov.matrices(modes)
         && certificate
             .lyapunov
@@ -450,6 +470,10 @@ fn check_observer_sizes(
             "the observer's gains do not have the sizes of the plant",
         ),
         (
+            form_fits,
+            "a Kalman filter has no injection and one H for each mode entered",
+        ),
+        (
             matrices_fit,
             "the observer's Lyapunov matrices do not have the size of the state",
         ),
@@ -462,7 +486,7 @@ fn check_observer_sizes(
 }
 
 /// The first condition that fails, as an error.
-fn require(conditions: &[(bool, &str)]) -> Result<(), CertificateError> {
+pub(crate) fn require(conditions: &[(bool, &str)]) -> Result<(), CertificateError> {
     match conditions.iter().find(|(holds, _)| !holds) {
         Some((_, what)) => Err(CertificateError::Malformed((*what).into())),
         None => Ok(()),

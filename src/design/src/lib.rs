@@ -20,6 +20,7 @@ pub mod lmi;
 mod lyapunov;
 pub mod observer;
 mod record;
+pub(crate) mod riccati;
 #[cfg(feature = "solver")]
 mod solver;
 mod spec;
@@ -36,7 +37,7 @@ use serde::{Deserialize, Serialize};
 pub use certificate::{CertificateError, ControlCertificate};
 pub use controllability::check_controllable;
 pub use lyapunov::{DwellTime, Lyapunov};
-pub use observer::{ObserverCertificate, ObserverDesign};
+pub use observer::{LostCertificate, ObserverCertificate, ObserverDesign};
 pub use record::{Design, FORMAT, Signal, Signals};
 #[cfg(feature = "solver")]
 pub use solver::{Run, Solver, Step};
@@ -100,7 +101,7 @@ pub fn synthesise_with(
     match (feedback, observer) {
         (Ok(state_feedback), Ok(observer)) => Ok(Synthesis {
             state_feedback,
-            observer,
+            observer: observer::with_lost_sensors(plant, observer, observer::USUAL_RATIO),
         }),
         (Err(error @ DesignError::Request(_)), _) | (_, Err(error @ DesignError::Request(_))) => {
             Err(error)

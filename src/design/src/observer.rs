@@ -2,15 +2,28 @@
 //!
 //! With `H_ij = E_i (C_j E_i)^+` for a switch from mode `i` to mode `j` and `T_ij = I - H_ij C_j`,
 //! the estimation error obeys `e(k+1) = (T_ij A_i - K_i C_i) e(k)`: the state disturbance is gone.
-//! A Luenberger observer is the same with `H = 0`, `T = I`.
+//! A Luenberger observer is the same with `H = 0`, `T = I`; a Kalman filter in correction form the
+//! same with `K = 0` and one `H_j` whatever mode was left.
 
 #[cfg(feature = "solver")]
 mod existence;
 #[cfg(feature = "solver")]
+mod kalman;
+mod lost;
+#[cfg(feature = "solver")]
+mod lost_synthesis;
+#[cfg(feature = "solver")]
 mod synthesis;
 
+pub use lost::{LostCertificate, MOST_FOR_PAIRS, sets};
+pub(crate) use lost::{corrected_error, verify as verify_lost};
+
+#[cfg(feature = "solver")]
+use existence::PerUnit;
 #[cfg(feature = "solver")]
 pub use synthesis::synthesise;
+#[cfg(feature = "solver")]
+pub(crate) use synthesis::{USUAL_RATIO, candidates, with_lost_sensors};
 
 use super::certificate::{self, CertificateError, LyapunovMatrix};
 use super::{DwellTime, ObserverSpec};
@@ -32,6 +45,9 @@ pub struct ObserverDesign {
     pub dwell: Option<DwellTime>,
     /// What proves it.
     pub certificate: ObserverCertificate,
+    /// What proves it with sensors lost; none where no set of lost sensors is served.
+    #[serde(default)]
+    pub lost: Option<LostCertificate>,
 }
 
 /// What, beside the plant and the gains, it takes to prove an observer.

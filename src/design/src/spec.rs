@@ -164,13 +164,16 @@ fn check_decay(name: &str, decay: f64, lyapunov: Lyapunov) -> Result<(), String>
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum ObserverChoice {
-    /// The unknown input observer where it exists and helps, else the Luenberger observer.
+    /// The one that serves the running loop best: a Kalman filter, or the unknown input observer where
+    /// it exists and the command is quieter with it.
     #[default]
     Auto,
     /// The unknown input observer (11)-(17): the state disturbance does not reach the estimate.
     Uio,
     /// No decoupling: `H = 0`, `T = I`.
     Luenberger,
+    /// A Kalman filter in correction form, its ratio of noises chosen for the running loop.
+    Kalman,
 }
 
 /// The observer that is asked for.
@@ -182,6 +185,10 @@ pub struct ObserverSpec {
     pub decay: f64,
     /// Which guarantee of stability under switching.
     pub lyapunov: Lyapunov,
+    /// Standard deviation of each sensor's noise (p), in output units; only their proportions matter.
+    /// Empty: in proportion to the nominal values.
+    #[serde(default)]
+    pub noise: Vec<f64>,
 }
 
 impl ObserverSpec {

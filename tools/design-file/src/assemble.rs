@@ -450,10 +450,12 @@ fn observer(given: &schema::Observer, control: &ControlSpec) -> Result<ObserverS
         kind: match given.kind.unwrap_or(defaults::OBSERVER) {
             ObserverKind::Uio => Kind::Uio,
             ObserverKind::Luenberger => Kind::Luenberger,
+            ObserverKind::Kalman => Kind::Kalman,
             ObserverKind::Auto => Kind::Auto,
         },
         decay,
         lyapunov: control.lyapunov,
+        noise: Vec::new(),
     })
 }
 

@@ -197,7 +197,9 @@ pub enum ObserverKind {
     Uio,
     /// Luenberger observer.
     Luenberger,
-    /// The first where it exists, else the second.
+    /// Kalman filter chosen for the running loop.
+    Kalman,
+    /// The one that serves the running loop best.
     Auto,
 }
 

@@ -120,6 +120,7 @@ fn observer(design: &Design) -> Vec<(String, String)> {
     let kind = match observer.kind {
         ObserverKind::Uio => "unknown input observer (the state disturbance is decoupled)",
         ObserverKind::Luenberger => "Luenberger observer",
+        ObserverKind::Kalman => "Kalman filter in correction form",
     };
     let mut lines = vec![line("kind", kind)];
     lines.extend(observer.note.iter().map(|note| line("because", note)));

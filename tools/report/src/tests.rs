@@ -101,6 +101,8 @@ fn lags(outputs: usize, disturbances: usize, steps: u64) -> Design {
                 note: Some("no disturbance to decouple".into()),
                 gains: vec![Gain(&square * 0.4); 2],
                 decoupling: vec![vec![nothing; 2]; 2],
+                lost: Vec::new(),
+                minimum_dwell: 0,
             },
             estimator: Estimator {
                 method: EstimatorMethod::None,

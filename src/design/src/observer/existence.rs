@@ -9,7 +9,7 @@ use nalgebra::{Complex, DMatrix};
 const RANK_TOLERANCE: f64 = 1e-10;
 
 /// Units in which ranks are decided.
-pub(super) struct PerUnit<'a> {
+pub(crate) struct PerUnit<'a> {
     pub states: &'a [f64],
     pub outputs: &'a [f64],
 }

@@ -1,6 +1,8 @@
 //! The road from a plant to a certified observer.
 
 use super::existence::{PerUnit, check_detectable, decoupling};
+use super::kalman::Filtered;
+use super::lost_synthesis::{self, Demand, blended, common_function};
 use super::{ObserverCertificate, ObserverDesign};
 use crate::augmented::scaled;
 use crate::certificate::{LyapunovMatrix, observer_growth};
@@ -42,6 +44,10 @@ fn chosen(
     match spec.kind {
         ObserverChoice::Uio => unknown_input(plant, spec, scaling),
         ObserverChoice::Luenberger => luenberger(plant, spec, scaling, None),
+        ObserverChoice::Kalman => match kalman(plant, spec, &units(scaling), USUAL_RATIO) {
+            Some(observer) => Ok(observer),
+            None => luenberger(plant, spec, scaling, None),
+        },
         ObserverChoice::Auto => match reason_against(plant) {
             Some(reason) => luenberger(plant, spec, scaling, Some(reason)),
             None => unknown_input(plant, spec, scaling)
@@ -116,6 +122,15 @@ impl OwnedUnits {
             states: &self.states,
             outputs: &self.outputs,
         }
+    }
+}
+
+impl OwnedUnits {
+    /// A gain (n x p) of these units in physical units.
+    fn physical(&self, gain: &DMatrix<f64>) -> DMatrix<f64> {
+        let outward: Vec<f64> = self.states.iter().map(|unit| 1.0 / unit).collect();
+        let inward: Vec<f64> = self.outputs.iter().map(|unit| 1.0 / unit).collect();
+        scaled(gain, &outward, &inward)
     }
 }
 
@@ -273,48 +288,204 @@ fn attempt(
         }
     }
     matrices.truncate(spec.lyapunov.matrices(gains.len()));
-    let errors = |i: usize| &model.projected[i][i] - &gains[i] * &model.outputs[i];
-    let physical = |gain: &DMatrix<f64>| {
-        let outward: Vec<f64> = units.states.iter().map(|unit| 1.0 / unit).collect();
-        let inward: Vec<f64> = units.outputs.iter().map(|unit| 1.0 / unit).collect();
-        scaled(gain, &outward, &inward)
-    };
-    let mut found = ObserverDesign {
-        spec: spec.clone(),
-        spectral_radius: (0..gains.len())
-            .map(|i| spectral_radius(&errors(i)))
+    let parts = Parts {
+        radius: (0..gains.len())
+            .map(|i| spectral_radius(&(&model.projected[i][i] - &gains[i] * &model.outputs[i])))
             .collect(),
-        observer: Observer {
-            kind,
-            note,
-            gains: gains.iter().map(|gain| Gain(physical(gain))).collect(),
-            decoupling: h
-                .iter()
-                .map(|row| row.iter().cloned().map(Gain).collect())
-                .collect(),
-        },
-        dwell: None,
-        certificate: ObserverCertificate {
-            states: units.states.clone(),
-            outputs: units.outputs.clone(),
-            lyapunov: matrices.into_iter().map(LyapunovMatrix).collect(),
-        },
+        gains: gains.iter().map(|gain| units.physical(gain)).collect(),
+        decoupling: h.to_vec(),
+        matrices,
     };
-    if spec.lyapunov != Lyapunov::Dwell {
-        found.verify(plant)?;
-        return Ok(found);
-    }
-    let mu = observer_growth(plant, &found).ok_or(SolverFailure::NumericalTrouble)?;
-    let mut outcome = Err(SolverFailure::NumericalTrouble.into());
-    for allowance in DwellTime::ALLOWANCES {
-        let dwell = DwellTime::new(mu * (1.0 + allowance), spec.decay, plant.sample_time);
-        found.dwell = Some(dwell);
-        outcome = found.verify(plant).map_err(DesignError::from);
-        if outcome.is_ok() {
-            break;
+    parts.proved(plant, spec, units, kind, note)
+}
+
+/// An observer that has not been proved yet.
+struct Parts {
+    /// Spectral radius of each mode's error.
+    radius: Vec<f64>,
+    /// `K_i` in physical units.
+    gains: Vec<DMatrix<f64>>,
+    /// `H_ij` in physical units.
+    decoupling: Vec<Vec<DMatrix<f64>>>,
+    /// Lyapunov matrices in per-unit.
+    matrices: Vec<DMatrix<f64>>,
+}
+
+impl Parts {
+    /// The observer, once what it claims is proved.
+    fn proved(
+        self,
+        plant: &SwitchedPlant,
+        spec: &ObserverSpec,
+        units: &OwnedUnits,
+        kind: ObserverKind,
+        note: Option<String>,
+    ) -> Result<ObserverDesign, DesignError> {
+        let wrap = |row: Vec<DMatrix<f64>>| row.into_iter().map(Gain).collect();
+        let mut found = ObserverDesign {
+            spec: spec.clone(),
+            spectral_radius: self.radius,
+            observer: Observer {
+                kind,
+                note,
+                gains: wrap(self.gains),
+                decoupling: self.decoupling.into_iter().map(wrap).collect(),
+                lost: Vec::new(),
+                minimum_dwell: 0,
+            },
+            dwell: None,
+            certificate: ObserverCertificate {
+                states: units.states.clone(),
+                outputs: units.outputs.clone(),
+                lyapunov: self.matrices.into_iter().map(LyapunovMatrix).collect(),
+            },
+            lost: None,
+        };
+        if spec.lyapunov != Lyapunov::Dwell {
+            found.verify(plant)?;
+            return Ok(found);
         }
+        let mu = observer_growth(plant, &found).ok_or(SolverFailure::NumericalTrouble)?;
+        let mut outcome = Err(SolverFailure::NumericalTrouble.into());
+        for allowance in DwellTime::ALLOWANCES {
+            let dwell = DwellTime::new(mu * (1.0 + allowance), spec.decay, plant.sample_time);
+            found.dwell = Some(dwell);
+            outcome = found.verify(plant).map_err(DesignError::from);
+            if outcome.is_ok() {
+                break;
+            }
+        }
+        outcome.map(|()| found)
     }
-    outcome.map(|()| found)
+}
+
+/// Ratios of the sensors' noise to the disturbance that are tried for a Kalman filter.
+const RATIOS: [f64; 13] = [
+    1e-4, 3e-4, 1e-3, 3e-3, 1e-2, 3e-2, 0.1, 0.2, 0.5, 1.0, 3.0, 10.0, 100.0,
+];
+
+/// A ratio in the middle, where nothing chooses one.
+pub(crate) const USUAL_RATIO: f64 = 0.1;
+
+/// The plant as the filters of all modes see it.
+fn filters(plant: &SwitchedPlant, spec: &ObserverSpec, units: &OwnedUnits) -> Vec<Filtered> {
+    let noise = match spec.noise.len() == units.outputs.len() {
+        true => &spec.noise,
+        false => &units.outputs,
+    };
+    let modes = plant.modes.iter();
+    modes
+        .map(|mode| Filtered::new(mode, &units.per_unit(), noise))
+        .collect()
+}
+
+/// The Kalman filter of this ratio of noises, moved towards faster decay where the filter itself does
+/// not decay as asked, and proved; `None` where there is none.
+fn kalman(
+    plant: &SwitchedPlant,
+    spec: &ObserverSpec,
+    units: &OwnedUnits,
+    ratio: f64,
+) -> Option<ObserverDesign> {
+    let filters = filters(plant, spec, units);
+    let kalman = filters.iter().map(|filter| filter.gain(&[], ratio));
+    let (gains, matrices) = with_functions(spec, &filters, kalman.collect::<Option<_>>()?)?;
+    let errors = filters
+        .iter()
+        .zip(&gains)
+        .map(|(filter, gain)| filter.error(gain));
+    let modes = filters.len();
+    let physical: Vec<DMatrix<f64>> = gains.iter().map(|gain| units.physical(gain)).collect();
+    let parts = Parts {
+        radius: errors.map(|error| spectral_radius(&error)).collect(),
+        gains: vec![DMatrix::zeros(filters[0].a.nrows(), filters[0].c.nrows()); modes],
+        decoupling: vec![physical; modes],
+        matrices,
+    };
+    parts
+        .proved(plant, spec, units, ObserverKind::Kalman, None)
+        .ok()
+}
+
+/// Gains (per-unit) near the given ones, and matrices in which their errors decay as asked.
+#[allow(clippy::type_complexity, reason = "two lists, one line")]
+fn with_functions(
+    spec: &ObserverSpec,
+    filters: &[Filtered],
+    kalman: Vec<DMatrix<f64>>,
+) -> Option<(Vec<DMatrix<f64>>, Vec<DMatrix<f64>>)> {
+    let decay = spec.decay * (1.0 - 1e-7);
+    let fixed = |i: usize| Demand::Fixed(filters[i].error(&kalman[i]));
+    let mut gains = kalman.clone();
+    let mut matrices = Vec::new();
+    for group in spec.lyapunov.groups(filters.len()) {
+        let demands: Vec<Demand> = group.iter().map(|&i| fixed(i)).collect();
+        if let Some(function) = common_function(&demands, decay) {
+            matrices.push(function);
+            continue;
+        }
+        let free = |&i: &usize| Demand::Free(&filters[i], &[]);
+        let function = common_function(&group.iter().map(free).collect::<Vec<_>>(), decay)?;
+        for i in group {
+            gains[i] = blended(&filters[i], &[], &kalman[i], &function, decay)?;
+        }
+        matrices.push(function);
+    }
+    let wanted = spec.lyapunov.matrices(filters.len());
+    let shared = matrices[0].clone();
+    matrices.resize(wanted, shared);
+    Some((gains, matrices))
+}
+
+/// The Kalman filters of the usual ratios of noises that decay as asked, and, where asked for and where
+/// it exists, the unknown input observer.
+///
+/// # Errors
+/// Where there is none of them: why there is no observer at all.
+pub(crate) fn candidates(
+    plant: &SwitchedPlant,
+    spec: &ObserverSpec,
+    scaling: &Scaling,
+) -> Result<Vec<(ObserverDesign, f64)>, DesignError> {
+    Dimensions::check(plant).map_err(DesignError::Request)?;
+    spec.check().map_err(DesignError::Request)?;
+    let only = |found: Result<ObserverDesign, DesignError>| {
+        found.map(|observer| vec![(observer, USUAL_RATIO)])
+    };
+    let mut found: Vec<(ObserverDesign, f64)> = Vec::new();
+    match spec.kind {
+        ObserverChoice::Uio => return only(unknown_input(plant, spec, scaling)),
+        ObserverChoice::Luenberger => return only(luenberger(plant, spec, scaling, None)),
+        ObserverChoice::Auto if reason_against(plant).is_none() => {
+            let decoupled = unknown_input(plant, spec, scaling);
+            found.extend(decoupled.map(|observer| (observer, USUAL_RATIO)));
+        }
+        ObserverChoice::Auto | ObserverChoice::Kalman => {}
+    }
+    let units = units(scaling);
+    let ratios = RATIOS
+        .iter()
+        .map(|&ratio| (kalman(plant, spec, &units, ratio), ratio));
+    found.extend(ratios.filter_map(|(observer, ratio)| Some((observer?, ratio))));
+    match found.is_empty() {
+        // The same conditions of existence, with their names.
+        true => only(luenberger(plant, spec, scaling, None)),
+        false => Ok(found),
+    }
+}
+
+/// The observer with gains for every set of lost sensors that can be served and proved.
+pub(crate) fn with_lost_sensors(
+    plant: &SwitchedPlant,
+    observer: ObserverDesign,
+    ratio: f64,
+) -> ObserverDesign {
+    let units = OwnedUnits {
+        states: observer.certificate.states.clone(),
+        outputs: observer.certificate.outputs.clone(),
+    };
+    let filters = filters(plant, &observer.spec, &units);
+    lost_synthesis::add(plant, observer, &filters, ratio)
 }
 
 /// The changes among the usual ones that work.

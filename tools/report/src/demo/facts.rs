@@ -104,6 +104,7 @@ fn observer(design: &Design) -> String {
             "unknown input observer: the disturbance is decoupled from the state estimate"
         }
         ObserverKind::Luenberger => "Luenberger observer",
+        ObserverKind::Kalman => "Kalman filter",
     };
     match &observer.note {
         Some(note) => format!("{kind} ({note})"),
