@@ -3,10 +3,12 @@
 mod plants;
 
 use ftc_design::augmented::augment;
-use ftc_design::state_feedback::synthesise;
-use ftc_design::{ControlSpec, DesignError, Lyapunov, Objective, StateFeedback, Units};
+use ftc_design::state_feedback::{synthesise, synthesise_with};
+use ftc_design::{
+    ControlSpec, DesignError, Lyapunov, Objective, Run, Solver, StateFeedback, Units,
+};
 use ftc_plant::scaling::Scaling;
-use ftc_plant::{SwitchedPlant, spectral_radius};
+use ftc_plant::{Dimensions, SwitchedPlant, spectral_radius};
 use nalgebra::{Complex, DMatrix};
 use plants::{
     Channel, half_unstable, paper, paper_spec, random_plant, rectifier, sparsely_disturbed,
@@ -468,4 +470,107 @@ fn more_tracked_outputs_than_inputs_are_refused_at_once() {
         error.to_string(),
         "2 tracked outputs need at least 2 inputs, but the plant has 1: track fewer outputs"
     );
+}
+
+/// A plant and a request in other units of states, inputs and outputs.
+fn in_units(
+    plant: &SwitchedPlant,
+    spec: &ControlSpec,
+    units: &Scaling,
+) -> (SwitchedPlant, ControlSpec) {
+    let over = |weights: &[f64], units: &mut dyn Iterator<Item = f64>| {
+        weights.iter().zip(units).map(|(w, u)| w * u).collect()
+    };
+    let tracked = || spec.tracked.iter().map(|&output| units.outputs[output]);
+    let changed = ControlSpec {
+        output_weight: over(&spec.output_weight, &mut tracked()),
+        integral_weight: over(&spec.integral_weight, &mut tracked()),
+        input_weight: over(&spec.input_weight, &mut units.inputs.iter().copied()),
+        ..spec.clone()
+    };
+    (units.apply(plant), changed)
+}
+
+/// Each guarantee in turn, with the usual weights.
+fn usual_spec(seed: u64, dims: Dimensions) -> ControlSpec {
+    let r = dims.outputs.min(dims.inputs);
+    ControlSpec {
+        decay: 0.95,
+        lyapunov: [Lyapunov::Common, Lyapunov::Switched, Lyapunov::Dwell][seed as usize % 3],
+        integral_weight: vec![0.3; r],
+        input_weight: vec![0.1; dims.inputs],
+        ..ControlSpec::new(dims)
+    }
+}
+
+/// Units spread over twelve decades change neither the verdict nor gamma: the whole is in the bench.
+#[test]
+fn units_change_neither_verdict_nor_gamma() {
+    let mut designed = 0;
+    for seed in 0..12 {
+        let plant = random_plant(seed, 1.0);
+        let dims = plant.dimensions();
+        let spec = usual_spec(seed, dims);
+        let mut exponent = {
+            let mut state = seed.wrapping_mul(0x9E37_79B9_7F4A_7C15) | 1;
+            move || {
+                state = state
+                    .wrapping_mul(6364136223846793005)
+                    .wrapping_add(1442695040888963407);
+                10f64.powf(12.0 * ((state >> 11) as f64 / (1u64 << 53) as f64) - 6.0)
+            }
+        };
+        let units = Scaling {
+            states: (0..dims.states).map(|_| exponent()).collect(),
+            inputs: (0..dims.inputs).map(|_| exponent()).collect(),
+            outputs: (0..dims.outputs).map(|_| exponent()).collect(),
+        };
+        let (twin, twin_spec) = in_units(&plant, &spec, &units);
+        let own = synthesise(&plant, &spec, &Scaling::automatic(&plant));
+        let other = synthesise(&twin, &twin_spec, &Scaling::automatic(&twin));
+        match (own, other) {
+            (Ok(own), Ok(other)) => {
+                designed += 1;
+                let pairs = own.gamma.unwrap().into_iter().zip(other.gamma.unwrap());
+                for (own, other) in pairs {
+                    assert!(
+                        (own / other - 1.0).abs() < 1e-4,
+                        "seed {seed}: {own} {other}"
+                    );
+                }
+            }
+            (Err(DesignError::Infeasible(_)), Err(DesignError::Infeasible(_))) => {}
+            (own, other) => panic!("seed {seed}: {:?} {:?}", own.err(), other.err()),
+        }
+    }
+    assert!(designed >= 6, "{designed} designs");
+}
+
+/// Both solvers come to the same gamma.
+#[test]
+fn both_solvers_agree() {
+    let general = Run {
+        solver: Solver::General,
+        ..Run::default()
+    };
+    let mut compared = 0;
+    for seed in 0..9 {
+        let plant = random_plant(seed, 1.0);
+        let spec = usual_spec(seed, plant.dimensions());
+        let scaling = Scaling::automatic(&plant);
+        let (Ok(own), Ok(other)) = (
+            synthesise(&plant, &spec, &scaling),
+            synthesise_with(&plant, &spec, &scaling, &general),
+        ) else {
+            continue;
+        };
+        compared += 1;
+        for (own, other) in own.gamma.unwrap().into_iter().zip(other.gamma.unwrap()) {
+            assert!(
+                (own / other - 1.0).abs() < 1e-4,
+                "seed {seed}: {own} {other}"
+            );
+        }
+    }
+    assert!(compared >= 5, "{compared} plants compared");
 }

@@ -41,12 +41,25 @@ pub(crate) struct Solution {
     pub bound: f64,
     /// Trace of the multiplier of each block.
     pub multipliers: Vec<f64>,
+    /// Points on the way, near the central path, the widest gap first.
+    pub earlier: Vec<Centred>,
     /// Whether the gap was closed (or enough was reached).
     pub converged: bool,
+    /// Whether nothing more is to be had.
+    exhausted: bool,
     /// Whether the point satisfies every inequality strictly.
     pub feasible: bool,
     /// Iterations taken.
     pub iterations: usize,
+}
+
+/// A point that satisfies every inequality strictly, some way off the optimum.
+#[derive(Clone, Debug)]
+pub(crate) struct Centred {
+    /// The unknowns.
+    pub point: Point,
+    /// The scalar unknown.
+    pub value: f64,
 }
 
 /// Slacks and multipliers of blocks and bounds.
@@ -66,11 +79,19 @@ struct Residuals {
     trace: f64,
     dual: Gradient,
     primal_size: f64,
+    dual_size: f64,
     /// Rows of all blocks and bounds.
     rows: usize,
     /// Mean product of slack and multiplier.
     complementarity: f64,
     bound: f64,
+}
+
+impl Residuals {
+    /// The distance between value and bound, were the multipliers feasible.
+    fn gap(&self) -> f64 {
+        self.complementarity * self.rows as f64
+    }
 }
 
 /// A Newton direction, slacks and multipliers scaled.
@@ -90,8 +111,17 @@ const START: f64 = 10.0;
 /// Largest residual of the inequalities that counts as none.
 const PRIMAL: f64 = 1e-8;
 
-/// Complementarity this far below the gap that is asked for brings nothing any more.
-const EXHAUSTED: f64 = 1e-3;
+/// Largest residual of the multipliers that counts as none.
+const DUAL: f64 = 1e-5;
+
+/// A gap of slacks and multipliers this far below what is asked for brings nothing any more.
+const EXHAUSTED: f64 = 0.1;
+
+/// Relative gap of the first point on the central path that is kept.
+const FIRST_GAP: f64 = 1e-2;
+
+/// Least ratio of the gaps of two points that are kept.
+const GAP_BETWEEN: f64 = 5.0;
 
 /// Maximises the scalar unknown from `symmetric = I`, `full = 0`, `scalar = 0`; `watch` is told of
 /// every iteration. `None` where not a single step could be made.
@@ -102,11 +132,19 @@ pub(crate) fn maximise(
 ) -> Option<Solution> {
     let mut iterate = Iterate::start(problem);
     let mut best = None;
+    let mut earlier = Vec::new();
+    let mut next = FIRST_GAP;
     for iteration in 0..settings.iterations {
         watch(iteration);
         let residuals = iterate.residuals(problem);
         let solution = iterate.solution(&residuals, &settings, iteration);
-        let stop = solution.converged;
+        let gap = residuals.gap() / solution.value.abs();
+        if solution.feasible && gap < next {
+            let (point, value) = (solution.point.clone(), solution.value);
+            earlier.push(Centred { point, value });
+            next = gap / GAP_BETWEEN;
+        }
+        let stop = solution.converged || solution.exhausted;
         if solution.feasible || best.is_none() {
             best = Some(solution);
         }
@@ -117,7 +155,8 @@ pub(crate) fn maximise(
             break;
         }
     }
-    best.filter(|solution| solution.iterations > 0)
+    let best = best.filter(|solution: &Solution| solution.iterations > 0)?;
+    Some(Solution { earlier, ..best })
 }
 
 impl Iterate {
@@ -199,6 +238,7 @@ impl Iterate {
         Residuals {
             primal_size,
             rows: problem.rows(),
+            dual_size: dual.amax(),
             complementarity: products / problem.rows() as f64,
             blocks,
             bounds,
@@ -211,18 +251,18 @@ impl Iterate {
     fn solution(&self, residuals: &Residuals, settings: &Settings, iterations: usize) -> Solution {
         let value = self.point.scalar;
         let feasible = residuals.primal_size < PRIMAL;
-        // What the multipliers still lack, weighed with the unknowns, may move the bound.
-        let bound = residuals.bound + residuals.dual.weighed(&self.point);
+        let bounded = residuals.dual_size < DUAL;
         let allowed = settings.absolute_gap.max(settings.gap * value.abs());
-        let closed = bound - value < allowed;
-        let rows = residuals.rows as f64;
-        let exhausted = residuals.complementarity * rows < EXHAUSTED * allowed;
+        let gap = residuals.gap();
+        let bound = residuals.bound.max(value + gap);
         Solution {
             point: self.point.clone(),
             value,
-            bound,
+            bound: if bounded { bound } else { f64::INFINITY },
+            earlier: Vec::new(),
+            exhausted: feasible && gap < EXHAUSTED * allowed,
             multipliers: self.multipliers.iter().map(DMatrix::trace).collect(),
-            converged: feasible && (closed || exhausted || value > settings.enough),
+            converged: feasible && (bounded && gap < allowed || value > settings.enough),
             feasible,
             iterations,
         }

@@ -273,6 +273,7 @@ fn regularised(matrix: DMatrix<f64>, least: f64) -> Option<Triangular> {
     const LARGEST: f64 = 1e-6;
     const SMALL: f64 = 1e-2;
     let largest = matrix.diagonal().amax();
+    let largest = if largest > 0.0 { largest } else { 1.0 };
     let mut raise = least;
     while raise <= LARGEST {
         let mut raised = matrix.clone();
@@ -364,6 +365,90 @@ fn add_coupling(
                 }
             }
             at += 1;
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::interior_point::{Bound, Congruence, Product};
+    use proptest::prelude::*;
+
+    fn matrices(entries: &[f64], shapes: &[(usize, usize)]) -> Vec<DMatrix<f64>> {
+        let mut entries = entries.iter().copied().cycle();
+        let matrix = |&(rows, columns): &(usize, usize)| {
+            DMatrix::from_iterator(rows, columns, entries.by_ref().take(rows * columns))
+        };
+        shapes.iter().map(matrix).collect()
+    }
+
+    fn block(entries: &[f64], (first, second): (usize, usize), product: usize) -> Block {
+        let shapes = [(5, 3), (5, 3), (5, 3), (5, 2), (5, 3), (5, 5)];
+        let mut parts = matrices(entries, &shapes);
+        let scalar = parts.swap_remove(5);
+        let (right, left) = (parts.swap_remove(4), parts.swap_remove(3));
+        let terms = [(first, 1.0), (second, 1.0), (first, -1.0)];
+        let congruences = terms.into_iter().zip(parts);
+        Block {
+            constant: DMatrix::zeros(5, 5),
+            congruences: congruences
+                .map(|((unknown, sign), map)| Congruence { unknown, sign, map })
+                .collect(),
+            product: Some(Product {
+                unknown: product,
+                left,
+                right,
+            }),
+            scalar: Some(&scalar + scalar.transpose()),
+        }
+    }
+
+    proptest! {
+        /// The factored matrix is the one that the inequalities and their adjoint define.
+        #[test]
+        fn the_newton_matrix_is_that_of_the_inequalities(
+            entries in prop::collection::vec(-1.0..1.0f64, 400),
+        ) {
+            let (one, rest) = entries.split_at(83);
+            let (two, rest) = rest.split_at(89);
+            let (three, rest) = rest.split_at(97);
+            let problem = Problem {
+                order: 3,
+                symmetric: 2,
+                full: vec![(2, 3), (2, 3)],
+                blocks: vec![block(one, (0, 1), 0), block(two, (1, 0), 1), block(three, (1, 1), 1)],
+                bounds: vec![
+                    Bound { constant: 0.0, traces: vec![-1.0, 0.5], scalar: 0.3 },
+                    Bound { constant: 0.0, traces: vec![0.0, 0.0], scalar: -1.0 },
+                ],
+                total: None,
+            };
+            let roots = matrices(rest, &[(5, 5), (5, 5), (5, 5)]);
+            let weights: Vec<_> = roots.iter()
+                .map(|root| root * root.transpose() + DMatrix::identity(5, 5)).collect();
+            let ratios = [0.7, 1.9];
+            let wanted = {
+                let parts = matrices(&rest[75..], &[(3, 3), (3, 3), (2, 3), (2, 3)]);
+                Point {
+                    symmetric: parts[..2].iter().map(|q| q + q.transpose()).collect(),
+                    full: parts[2..].to_vec(),
+                    scalar: rest[111],
+                }
+            };
+            let pulled: Vec<_> = problem.blocks.iter().zip(&weights)
+                .map(|(block, weight)| weight * block.linear(&wanted) * weight).collect();
+            let bounds: Vec<_> = problem.bounds.iter().zip(ratios)
+                .map(|(bound, ratio)| ratio * bound.linear(&wanted)).collect();
+            let right = problem.adjoint(&pulled, &bounds);
+            let newton = Newton::new(&problem, &weights.iter().collect::<Vec<_>>(), &ratios);
+            prop_assume!(newton.is_some());
+            let (found, _) = newton.unwrap().solve(&problem, &right, 0.0);
+            let again: Vec<_> = problem.blocks.iter().map(|block| block.linear(&found)).collect();
+            for (block, found) in problem.blocks.iter().zip(&again) {
+                let error = (block.linear(&wanted) - found).amax();
+                prop_assert!(error < 1e-5, "{error}");
+            }
         }
     }
 }

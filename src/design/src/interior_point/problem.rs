@@ -82,30 +82,10 @@ pub(super) struct Gradient {
 }
 
 impl Gradient {
-    /// The sum of the magnitudes of its products with the coordinates of a point.
-    pub fn weighed(&self, point: &Point) -> f64 {
-        let order = point.symmetric[0].nrows();
-        let mut coordinates = self.reduced.iter();
-        let mut sum = 0.0;
-        for matrix in &point.symmetric {
-            for a in 0..order {
-                for b in 0..=a {
-                    sum += (coordinates.next().unwrap_or(&0.0) * matrix[(a, b)]).abs();
-                }
-            }
-        }
-        sum += (coordinates.next().unwrap_or(&0.0) * point.scalar).abs();
-        for (part, matrix) in self.full.iter().zip(&point.full) {
-            let entries = matrix
-                .row_iter()
-                .flat_map(|row| row.iter().copied().collect::<Vec<_>>());
-            sum += part
-                .iter()
-                .zip(entries)
-                .map(|(p, v)| (p * v).abs())
-                .sum::<f64>();
-        }
-        sum
+    /// The largest coordinate.
+    pub fn amax(&self) -> f64 {
+        let full = self.full.iter().map(DVector::amax);
+        full.fold(self.reduced.amax(), f64::max)
     }
 }
 

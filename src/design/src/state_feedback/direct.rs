@@ -12,6 +12,25 @@ const LARGEST_WORK: f64 = 6e11;
 /// Iterations of all solutions of one problem.
 const ITERATIONS: f64 = 45.0;
 
+/// How many sacrifices are tried before the central path is.
+const SMALL_SACRIFICES: usize = 2;
+
+/// How many points of the central path are tried.
+const CENTRED: usize = 5;
+
+/// What a point of the central path gives up of its own level, for rounding.
+const PATH_SACRIFICE: f64 = 1e-7;
+
+/// A level this far, relatively, above the least one is well inside.
+const INSIDE: f64 = 3e-6;
+
+/// The least level of a group, and the way there.
+pub(super) struct Found {
+    pub optimum: Optimum,
+    /// Levels that were passed, the largest first, with gains and Lyapunov matrices.
+    centred: Vec<(f64, Vec<Part>)>,
+}
+
 impl Road<'_> {
     /// The design from the coordinates of regulators; `None` where any part of it falls short.
     pub(super) fn direct(&self) -> Option<StateFeedback> {
@@ -26,15 +45,48 @@ impl Road<'_> {
             self.direct_level(&regulated.with_signals(&self.models, group), group)
         });
         let least = least.collect::<Option<Vec<_>>>()?;
-        SACRIFICES.iter().find_map(|&sacrifice| {
-            let mut levels = Levels::new(self);
-            let mut parts = Vec::new();
-            for (group, least) in groups.iter().zip(&least) {
-                let level = levels.set(group, least, sacrifice);
-                parts.extend(self.direct_centre(group, &least.frame, level)?);
-            }
-            self.certified(parts, Some(levels)).ok()
-        })
+        let (small, large) = SACRIFICES.split_at(SMALL_SACRIFICES);
+        let largest_margin = |&sacrifice: &f64| self.with_margin(&groups, &least, sacrifice);
+        small
+            .iter()
+            .find_map(largest_margin)
+            .or_else(|| (0..CENTRED).find_map(|back| self.on_path(&groups, &least, back)))
+            .or_else(|| large.iter().find_map(largest_margin))
+    }
+
+    /// Gains of largest margin at the least levels but for a `sacrifice`, certified.
+    fn with_margin(
+        &self,
+        groups: &[Vec<usize>],
+        least: &[Found],
+        sacrifice: f64,
+    ) -> Option<StateFeedback> {
+        let mut levels = Levels::new(self);
+        let mut parts = Vec::new();
+        for (group, found) in groups.iter().zip(least) {
+            let level = levels.set(group, &found.optimum, sacrifice);
+            parts.extend(self.direct_centre(group, &found.optimum.frame, level)?);
+        }
+        self.certified(parts, Some(levels)).ok()
+    }
+
+    /// Gains from the central path, `back` points before its end, certified.
+    fn on_path(
+        &self,
+        groups: &[Vec<usize>],
+        least: &[Found],
+        back: usize,
+    ) -> Option<StateFeedback> {
+        let mut levels = Levels::new(self);
+        let mut parts = Vec::new();
+        for (group, found) in groups.iter().zip(least) {
+            let at = found.centred.len().checked_sub(1 + back)?;
+            let (level, passed) = &found.centred[at];
+            let sacrifice = (level / found.optimum.level - 1.0).max(0.0) + PATH_SACRIFICE;
+            levels.set(group, &found.optimum, sacrifice);
+            parts.extend(passed.iter().cloned());
+        }
+        self.certified(parts, Some(levels)).ok()
     }
 
     /// Gains of largest margin at a level.
@@ -50,16 +102,29 @@ impl Road<'_> {
     }
 
     /// The least level of a group, sought in these coordinates.
-    pub(super) fn direct_level(&self, frame: &Frame, group: &[usize]) -> Option<Optimum> {
+    pub(super) fn direct_level(&self, frame: &Frame, group: &[usize]) -> Option<Found> {
         let models = &self.models;
         let floor = frame.view_level(REJECTION.powi(2));
         let view = frame.view(models);
-        let found = structured::least_level(&view, self.spec, group, floor, &self.run).ok()?;
-        let level = frame.restore_level(found.level);
-        Some(Optimum {
-            level,
-            bound: frame.restore_level(found.bound),
-            frame: Frame::of_attenuated(models, &frame.restore(found.parts), level)?,
+        let path = structured::least_level(&view, self.spec, group, floor, &self.run).ok()?;
+        let level = frame.restore_level(path.level);
+        let centred: Vec<_> = path
+            .centred
+            .into_iter()
+            .map(|(level, parts)| (frame.restore_level(level), frame.restore(parts)))
+            .collect();
+        // The last point that is still well inside gives better coordinates than the end itself.
+        let inside = centred
+            .iter()
+            .rfind(|(passed, _)| *passed > level * (1.0 + INSIDE));
+        let parts = inside.map_or_else(|| frame.restore(path.parts), |(_, parts)| parts.clone());
+        Some(Found {
+            optimum: Optimum {
+                level,
+                bound: frame.restore_level(path.bound),
+                frame: Frame::of_attenuated(models, &parts, level)?,
+            },
+            centred,
         })
     }
 

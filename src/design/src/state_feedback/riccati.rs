@@ -9,6 +9,7 @@
 use super::frame::Part;
 use crate::augmented::AugmentedMode;
 use crate::certificate::FactoredLyapunov;
+use crate::riccati::solve;
 use nalgebra::DMatrix;
 
 /// Relative accuracy of a level.
@@ -107,36 +108,15 @@ impl Data<'_> {
         Some((raised, self.solve(rate, raised).or(solved)?))
     }
 
-    /// The stabilising solution at a level, by doubling.
+    /// The stabilising solution at a level.
     fn solve(&self, rate: f64, level: f64) -> Option<Solved> {
-        const DOUBLINGS: usize = 40;
         let model = self.model;
         let size = model.a.nrows();
         let identity = DMatrix::<f64>::identity(size, size);
         let a = &model.a / rate;
         let game = &self.acting * model.b.transpose() / rate.powi(2)
             - &model.e * model.e.transpose() / level;
-        let (mut transition, mut reach, mut value) = (a.clone(), game.clone(), self.cost.clone());
-        let mut settled = false;
-        for _ in 0..DOUBLINGS {
-            let factor = (&identity + &reach * &value).lu();
-            let through = factor.solve(&transition)?;
-            let growth = transition.tr_mul(&(&value * &through));
-            reach += &transition * factor.solve(&(&reach * transition.transpose()))?;
-            transition = &transition * through;
-            reach = 0.5 * (&reach + reach.transpose());
-            value += 0.5 * (&growth + growth.transpose());
-            if !value.iter().all(|entry| entry.is_finite()) {
-                return None;
-            }
-            if growth.norm() <= 1e-13 * value.norm() {
-                settled = true;
-                break;
-            }
-        }
-        if !settled {
-            return None;
-        }
+        let value = solve(&a, &game, &self.cost)?;
         let room = DMatrix::identity(model.e.ncols(), model.e.ncols()) * level
             - model.e.tr_mul(&(&value * &model.e));
         room.cholesky()?;

@@ -15,15 +15,13 @@ use super::frame::Part;
 use crate::augmented::AugmentedMode;
 use crate::certificate::FactoredLyapunov;
 use crate::interior_point::{
-    Block, Bound, Congruence, Problem, Product, Settings, Solution, maximise,
+    Block, Bound, Congruence, Point, Problem, Product, Settings, Solution, maximise,
 };
 use crate::lmi::Margin;
 use crate::solver::{Run, Step};
 use crate::verdict::{BlockKind, BlockName, SolverFailure};
 use crate::{ControlSpec, Lyapunov, pseudo_inverse};
 use nalgebra::DMatrix;
-
-use super::theorem::LeastLevel;
 
 /// How far, as a factor, Lyapunov matrices may be from the identity on average.
 const REACH: f64 = 1e6;
@@ -230,8 +228,7 @@ impl<'a> Theorem<'a> {
     }
 
     /// Gains and Lyapunov matrices: `K~ = R G^-1`.
-    fn read(&self, solution: &Solution) -> Result<Vec<Part>, SolverFailure> {
-        let point = &solution.point;
+    fn read(&self, point: &Point) -> Result<Vec<Part>, SolverFailure> {
         let order = self.problem.order;
         let modes = self.group.iter().zip(&point.full).enumerate();
         modes
@@ -295,7 +292,7 @@ pub(super) fn stabilise(
     }
     let total: f64 = solution.multipliers.iter().sum();
     let shares = solution.multipliers.iter().map(|weight| weight / total);
-    let mut parts = theorem.read(&solution)?;
+    let mut parts = theorem.read(&solution.point)?;
     for part in &mut parts {
         // Nothing in (T1) holds down what the inputs do to no state: take it out.
         let input = &models[part.mode].b;
@@ -309,6 +306,18 @@ pub(super) fn stabilise(
     Ok((margin, parts))
 }
 
+/// The way to the least level.
+pub(super) struct Path {
+    /// The least `g` that was reached.
+    pub level: f64,
+    /// Below this no `g` is reached, in the method's view; zero where it cannot tell.
+    pub bound: f64,
+    /// Gains and Lyapunov matrices there.
+    pub parts: Vec<Part>,
+    /// Levels that were passed, the largest first, with what satisfies their inequalities strictly.
+    pub centred: Vec<(f64, Vec<Part>)>,
+}
+
 /// The least `g >= floor` of a group (T2), as the method sees it, with the gains that come with it.
 pub(super) fn least_level(
     models: &[AugmentedMode],
@@ -316,7 +325,7 @@ pub(super) fn least_level(
     group: &[usize],
     floor: f64,
     run: &Run,
-) -> Result<LeastLevel, SolverFailure> {
+) -> Result<Path, SolverFailure> {
     let mut theorem = Theorem::new(models, spec, group, Scalar::Level, run);
     theorem.require_attenuation(0.0);
     theorem.require_decay();
@@ -334,10 +343,20 @@ pub(super) fn least_level(
     if !(solution.feasible && solution.value > 0.0) {
         return Err(SolverFailure::NumericalTrouble);
     }
-    Ok(LeastLevel {
+    let earlier = solution.earlier.iter().map(|centred| {
+        let level = 1.0 / centred.value;
+        theorem.read(&centred.point).map(|parts| (level, parts))
+    });
+    let positive = solution.earlier.iter().all(|centred| centred.value > 0.0);
+    Ok(Path {
         level: 1.0 / solution.value,
         bound: 1.0 / solution.bound.max(solution.value),
-        parts: theorem.read(&solution)?,
+        centred: if positive {
+            earlier.collect::<Result<_, _>>()?
+        } else {
+            Vec::new()
+        },
+        parts: theorem.read(&solution.point)?,
     })
 }
 
@@ -364,7 +383,7 @@ pub(super) fn centred(
         },
     )?;
     match solution.feasible && solution.value > 0.0 {
-        true => theorem.read(&solution),
+        true => theorem.read(&solution.point),
         false => Err(SolverFailure::NumericalTrouble),
     }
 }

@@ -271,7 +271,7 @@ impl Road<'_> {
             Frame::of_stabilised(models, start).unwrap_or_else(|| Frame::identity(size, inputs));
         if self.run.solver == Solver::Structured {
             if let Some(found) = self.direct_level(&frame, group) {
-                return Ok(found);
+                return Ok(found.optimum);
             }
             (self.run.watch)(Step::GeneralSolver);
         }
