@@ -8,11 +8,11 @@ use ftc_design::{
     ControlSpec, DesignError, Lyapunov, Objective, Run, Solver, StateFeedback, Units,
 };
 use ftc_plant::scaling::Scaling;
-use ftc_plant::{Dimensions, SwitchedPlant, spectral_radius};
+use ftc_plant::{SwitchedPlant, spectral_radius};
 use nalgebra::{Complex, DMatrix};
 use plants::{
-    Channel, half_unstable, paper, paper_spec, random_plant, rectifier, sparsely_disturbed,
-    three_modes, two_channels,
+    Channel, half_unstable, in_units, paper, paper_spec, random_plant, rectifier,
+    sparsely_disturbed, spread_units, three_modes, two_channels, usual_spec,
 };
 
 /// Half a unit of the fourth decimal, to which the reference values are given, plus the hair that
@@ -472,37 +472,6 @@ fn more_tracked_outputs_than_inputs_are_refused_at_once() {
     );
 }
 
-/// A plant and a request in other units of states, inputs and outputs.
-fn in_units(
-    plant: &SwitchedPlant,
-    spec: &ControlSpec,
-    units: &Scaling,
-) -> (SwitchedPlant, ControlSpec) {
-    let over = |weights: &[f64], units: &mut dyn Iterator<Item = f64>| {
-        weights.iter().zip(units).map(|(w, u)| w * u).collect()
-    };
-    let tracked = || spec.tracked.iter().map(|&output| units.outputs[output]);
-    let changed = ControlSpec {
-        output_weight: over(&spec.output_weight, &mut tracked()),
-        integral_weight: over(&spec.integral_weight, &mut tracked()),
-        input_weight: over(&spec.input_weight, &mut units.inputs.iter().copied()),
-        ..spec.clone()
-    };
-    (units.apply(plant), changed)
-}
-
-/// Each guarantee in turn, with the usual weights.
-fn usual_spec(seed: u64, dims: Dimensions) -> ControlSpec {
-    let r = dims.outputs.min(dims.inputs);
-    ControlSpec {
-        decay: 0.95,
-        lyapunov: [Lyapunov::Common, Lyapunov::Switched, Lyapunov::Dwell][seed as usize % 3],
-        integral_weight: vec![0.3; r],
-        input_weight: vec![0.1; dims.inputs],
-        ..ControlSpec::new(dims)
-    }
-}
-
 /// Units spread over twelve decades change neither the verdict nor gamma: the whole is in the bench.
 #[test]
 fn units_change_neither_verdict_nor_gamma() {
@@ -511,20 +480,7 @@ fn units_change_neither_verdict_nor_gamma() {
         let plant = random_plant(seed, 1.0);
         let dims = plant.dimensions();
         let spec = usual_spec(seed, dims);
-        let mut exponent = {
-            let mut state = seed.wrapping_mul(0x9E37_79B9_7F4A_7C15) | 1;
-            move || {
-                state = state
-                    .wrapping_mul(6364136223846793005)
-                    .wrapping_add(1442695040888963407);
-                10f64.powf(12.0 * ((state >> 11) as f64 / (1u64 << 53) as f64) - 6.0)
-            }
-        };
-        let units = Scaling {
-            states: (0..dims.states).map(|_| exponent()).collect(),
-            inputs: (0..dims.inputs).map(|_| exponent()).collect(),
-            outputs: (0..dims.outputs).map(|_| exponent()).collect(),
-        };
+        let units = spread_units(seed, dims);
         let (twin, twin_spec) = in_units(&plant, &spec, &units);
         let own = synthesise(&plant, &spec, &Scaling::automatic(&plant));
         let other = synthesise(&twin, &twin_spec, &Scaling::automatic(&twin));
