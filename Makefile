@@ -1,4 +1,4 @@
-# The roads a person and a machine take. Everything needed beyond Rust, a C compiler, Python 3.11
+# What a person and CI run. Everything needed beyond Rust, a C compiler, Python 3.11
 # or later and make is installed into .venv by the rules below.
 
 PYTHON ?= python3
@@ -11,12 +11,12 @@ ZIG := target/platforms/zig
 FUZZER := cargo-fuzz@0.13.1
 TOOLS := $(CURDIR)/target/tools
 
-.PHONY: build fmu-linux64 fmu-all compare-platforms test test-rust test-python browser demo bench fuzz soak memcheck threadcheck lint clean
+.PHONY: build fmu-linux64 fmu-all wheel test-wheel compare-platforms test test-rust test-python browser demo bench fuzz soak memcheck threadcheck lint clean
 
 # The FMU binaries are made by themselves, with the profile meant for them: built with the whole
 # workspace they would carry the solver's symbols along.
 build:
-	cargo build --release --workspace
+	cargo build --release --workspace --exclude ftc-python
 	cargo build --profile fmu --package ftc-controller-fmu --package ftc-plant-fmu
 	tools/platforms/native.sh
 
@@ -28,14 +28,28 @@ fmu-linux64: build $(ZIG)/ready
 fmu-all: build $(ZIG)/ready
 	PATH="$(CURDIR)/$(ZIG)/bin:$$PATH" tools/platforms/build.sh linux64 win64 aarch64-linux
 
+# The Python package with the program and FMU binaries inside, dist/ftc_fmu-*.whl. PLATFORMS says for
+# which systems its exports are; every one of them is built first (docs/platforms.md).
+PLATFORMS ?= linux64 win64 aarch64-linux
+
+wheel: build $(ZIG)/ready
+	PATH="$(CURDIR)/$(ZIG)/bin:$$PATH" tools/platforms/build.sh $(PLATFORMS)
+	PATH="$(CURDIR)/$(ZIG)/bin:$$PATH" tools/python/build.sh $(PLATFORMS)
+
+# The wheel in an environment of its own that knows no Rust: its tests, the examples, and README's lines.
+WHEEL := target/wheel
+
+test-wheel:
+	PYTHON="$(PYTHON)" tools/python/test.sh $(WHEEL)
+
 # Closes an example's loop on every platform built, under wine and qemu, and compares the bits.
 compare-platforms: fmu-all $(VENV)/ready
 	PYTHONPATH=tests/support $(IN_VENV)python tests/platforms/compare.py examples/paper.toml
 
-$(ZIG)/ready: tools/platforms/requirements.txt
+$(ZIG)/ready: tools/platforms/requirements.txt tools/python/requirements.txt
 	rm -rf $(ZIG)
 	$(PYTHON) -m venv $(ZIG)
-	$(ZIG)/bin/pip install --quiet --disable-pip-version-check --requirement tools/platforms/requirements.txt
+	$(ZIG)/bin/pip install --quiet --disable-pip-version-check --requirement tools/platforms/requirements.txt --requirement tools/python/requirements.txt
 	touch $@
 
 test: lint test-rust test-python
@@ -43,7 +57,7 @@ test: lint test-rust test-python
 # In release mode: the design's optimisation problems are solved many times over, and the Python
 # tests need the release binaries anyway.
 test-rust: build
-	cargo test --release --workspace
+	cargo test --release --workspace --exclude ftc-python
 
 # PYTEST may hold options, such as --nothing-skipped.
 test-python: build $(VENV)/ready
@@ -109,6 +123,7 @@ lint: $(VENV)/ready
 	RUSTDOCFLAGS="-D warnings" cargo doc --workspace --no-deps
 	$(IN_VENV)ruff check
 	$(IN_VENV)ruff format --check
+	$(PYTHON) tests/promises.py
 
 clean:
 	cargo clean

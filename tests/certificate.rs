@@ -1,4 +1,6 @@
 //! The certificate: proves what holds, refuses what does not, survives being written down.
+//!
+//! promise: certified-gains
 
 mod plants;
 

@@ -2,6 +2,8 @@
 //!
 //! Between its decisions a tick of the linear parts is affine, so the differences are exact but
 //! for rounding; the rectifier's are as good as its integrator.
+//!
+//! promise: exact-derivatives
 
 mod common;
 

@@ -1,5 +1,7 @@
 //! Faults of every kind, on one sensor or both, overlapping, at a mode switch, and while the
 //! estimator holds: the true output stays near that of a controller told the fault.
+//!
+//! promise: fault-kinds
 
 mod common;
 

@@ -1,5 +1,7 @@
 //! The promise of the whole method on the paper's scenario A: with a lying sensor the true output
 //! behaves as if the controller had been told the truth.
+//!
+//! promise: told-the-fault
 
 mod common;
 

@@ -1,5 +1,7 @@
 //! The promise survives a wrong model: gains from matrices that are off by 10 %, the predictor from
 //! a healthy log of the true plant, and still as good as being told the fault.
+//!
+//! promise: model-error
 
 mod common;
 

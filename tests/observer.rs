@@ -1,4 +1,6 @@
 //! The observer: existence, decoupling, decay under every switching, units.
+//!
+//! promise: certified-gains
 
 mod plants;
 

@@ -1,4 +1,6 @@
 //! The on-line path is sacred: no allocation, finite in and finite out, the same bits every time.
+//!
+//! promise: no-allocation
 
 mod common;
 

@@ -1,6 +1,8 @@
 //! Faults where the estimator knows least: from the first sample on, and across a mode switch.
 //!
 //! Each of these once left the loop wrong for ever.
+//!
+//! promise: fault-kinds
 
 mod common;
 

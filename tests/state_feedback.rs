@@ -1,4 +1,6 @@
 //! Theorems T1 and T2: optima, verdicts, and what the gains really do.
+//!
+//! promise: certified-gains
 
 mod plants;
 

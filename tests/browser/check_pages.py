@@ -5,6 +5,8 @@
 Fails on a console message, a request to anywhere, a page wider than its window, an element that
 sticks out of it, a figure without size or whose lettering is too small, or one scheme that looks
 like the other.
+
+promise: readable-pages
 """
 
 from __future__ import annotations

@@ -1,4 +1,7 @@
-"""The design reaches the optimum that an independent formulation and another solver find."""
+"""The design reaches the optimum that an independent formulation and another solver find.
+
+promise: optimal-gamma
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,8 @@
-"""A C program drives the exported FMUs: nothing depends on Rust or Python."""
+"""A C program drives the exported FMUs: nothing depends on Rust or Python.
+
+promise: independent-instances
+promise: memory-safety
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,7 @@
-"""Two FMUs and a master: the same numbers as the native run, whatever the master's habits."""
+"""Two FMUs and a master: the same numbers as the native run, whatever the master's habits.
+
+promise: same-as-native
+"""
 
 from __future__ import annotations
 

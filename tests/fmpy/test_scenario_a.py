@@ -1,4 +1,7 @@
-"""Scenario A, the promise in numbers: with FTC as good as knowing the fault, without it ten times worse."""
+"""Scenario A, the promise in numbers: with FTC as good as knowing the fault, without it ten times worse.
+
+promise: told-the-fault
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,7 @@
-"""Designs of all sizes: each a valid pair of FMUs, and a loop that equals the native one."""
+"""Designs of all sizes: each a valid pair of FMUs, and a loop that equals the native one.
+
+promise: all-sizes
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,7 @@
-"""What is in an exported archive, whoever opens it."""
+"""What is in an exported archive, whoever opens it.
+
+promise: reproducible-export
+"""
 
 from __future__ import annotations
 

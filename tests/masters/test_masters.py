@@ -1,4 +1,8 @@
-"""The loop in several masters that step both FMUs at once: one sample of delay, designed for."""
+"""The loop in several masters that step both FMUs at once: one sample of delay, designed for.
+
+promise: other-masters
+promise: ssp-package
+"""
 
 from __future__ import annotations
 

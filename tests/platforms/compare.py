@@ -4,6 +4,8 @@
 
 win64 runs under wine, aarch64-linux under qemu with that architecture's C library from Debian's
 packages. Ends with an error if any bit differs.
+
+promise: three-platforms
 """
 
 from __future__ import annotations

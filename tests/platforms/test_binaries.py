@@ -1,4 +1,7 @@
-"""What the FMU binaries ask of the machine they run on."""
+"""What the FMU binaries ask of the machine they run on.
+
+promise: three-platforms
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,7 @@
-"""The native run against the second implementation: the same trajectories to 1e-9."""
+"""The native run against the second implementation: the same trajectories to 1e-9.
+
+promise: second-implementation
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,6 @@
 //! Random sequences of calls with random arguments on the controller.
+//!
+//! promise: hostile-calls
 
 #![no_main]
 

@@ -1,4 +1,6 @@
 //! Forged designs for the controller.
+//!
+//! promise: hostile-calls
 
 #![no_main]
 

@@ -1,4 +1,6 @@
 //! Any text as the location of the resources.
+//!
+//! promise: hostile-calls
 
 #![no_main]
 

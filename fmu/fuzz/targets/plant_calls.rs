@@ -1,4 +1,6 @@
 //! Random sequences of calls with random arguments on the plant.
+//!
+//! promise: hostile-calls
 
 #![no_main]
 

@@ -1,4 +1,6 @@
 //! Forged designs for the plant.
+//!
+//! promise: hostile-calls
 
 #![no_main]
 

@@ -1,4 +1,6 @@
 //! Saved states of the controller that somebody forged: edited bytes under a checksum that holds.
+//!
+//! promise: hostile-calls
 
 #![no_main]
 

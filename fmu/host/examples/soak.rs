@@ -2,6 +2,8 @@
 //!
 //! Every signal must remain finite, the clock must not drift, and memory must not grow. Prints
 //! what was measured; a broken promise is a panic.
+//!
+//! promise: long-run
 
 use fmu_host::model::example;
 use fmu_host::{Coupling, Library, Loop, Model};

@@ -1,4 +1,6 @@
 //! Nothing is allocated between fmi2ExitInitializationMode and fmi2Terminate.
+//!
+//! promise: no-allocation
 
 use fmu_host::model::example;
 use fmu_host::types::Status;

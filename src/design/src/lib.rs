@@ -27,6 +27,8 @@ mod spec;
 pub mod state_feedback;
 mod units;
 mod verdict;
+#[cfg(feature = "solver")]
+pub mod warnings;
 
 use ftc_plant::SwitchedPlant;
 #[cfg(feature = "solver")]

@@ -5,6 +5,7 @@ pub mod closed_loop;
 pub mod integrate;
 pub mod metrics;
 pub mod plant;
+pub mod warnings;
 
 pub use closed_loop::{Trajectory, Variant, run, run_with};
 pub use plant::{PlantSimulator, PlantState};

@@ -4,7 +4,6 @@ use ftc_design::{ControlSpec, DesignError};
 use report::summary;
 use std::fmt;
 use std::path::Path;
-use std::process::ExitCode;
 
 /// Why a command failed.
 #[derive(Debug)]
@@ -77,10 +76,10 @@ impl Failure {
     }
 
     /// See the command line's help.
-    pub fn exit_code(&self) -> ExitCode {
+    pub fn exit_code(&self) -> u8 {
         match self {
-            Self::Input(_) => ExitCode::from(2),
-            Self::NoDesign { .. } | Self::Refused { .. } => ExitCode::from(1),
+            Self::Input(_) => crate::INPUT,
+            Self::NoDesign { .. } | Self::Refused { .. } => crate::NO_SUCH,
         }
     }
 }

@@ -1,5 +1,7 @@
 //! Whatever is wrong with a design file: one sentence that names file, key and remedy, exit code
 //! 2, and nothing written.
+//!
+//! promise: one-sentence
 #![allow(missing_docs)]
 
 mod common;

@@ -1,4 +1,6 @@
 //! Designs and faults under which the loop once went wrong, kept as they were found.
+//!
+//! promise: fault-kinds
 #![allow(missing_docs)]
 
 mod common;

@@ -5,6 +5,8 @@
 //! The solver's linear algebra picks its instructions by processor, so bits are compared only where
 //! the same ones are present as at recording; elsewhere the figures of merit agree to 1e-4.
 //! `FTC_RENEW_GOLDEN=1 cargo test --package ftc-fmu --test golden` records anew; say why in the commit.
+//!
+//! promise: pinned-examples
 
 mod common;
 

@@ -1,4 +1,6 @@
 //! Databases of healthy operation from CSV files: what is read, and what is refused in one sentence.
+//!
+//! promise: sound-logs
 #![allow(missing_docs)]
 
 mod common;

@@ -1,4 +1,6 @@
 //! `verify` proves what an FMU promises, and notices whatever does not belong to it.
+//!
+//! promise: carried-proof
 #![allow(missing_docs)]
 
 mod common;

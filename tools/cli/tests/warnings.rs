@@ -121,7 +121,7 @@ fn a_reference_far_outside_the_database() {
         "mode 1",
         "valve = 1000 in steady state",
         "nominal",
-        "thresholds open",
+        "times wider there",
     ];
     one(&of_design(&far), &words);
     let run = of_run(&far, &[]);

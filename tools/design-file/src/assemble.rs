@@ -39,7 +39,7 @@ pub fn request(file: &DesignFile, folder: &Path) -> Result<Request, String> {
     at("name", check::identifier(&file.name))?;
     let plant = plant(file)?;
     let dims = Dimensions::check(&plant)?;
-    bearable(&plant, dims)?;
+    check_sizes(&plant, dims)?;
     let signals = signals(&file.signals, &plant, dims)?;
     let disturbance = disturbance(file, dims)?;
     let control = ControlSpec {
@@ -53,7 +53,7 @@ pub fn request(file: &DesignFile, folder: &Path) -> Result<Request, String> {
         folder,
     };
     let estimator = estimator(&file.estimator, disturbance, dims, &logs)?;
-    let scenario = Play {
+    let scenario = ScenarioContext {
         scenario: &file.scenario,
         known: estimator.disturbance.as_ref(),
         tracked: &control.tracked,
@@ -208,7 +208,7 @@ fn matrix(name: &str, given: &[Vec<f64>]) -> Result<DMatrix<f64>, String> {
 }
 
 /// Refuses what no solver could finish.
-fn bearable(plant: &SwitchedPlant, dims: Dimensions) -> Result<(), String> {
+fn check_sizes(plant: &SwitchedPlant, dims: Dimensions) -> Result<(), String> {
     let sizes = [
         ("states (rows of A)", dims.states),
         ("inputs (columns of B)", dims.inputs),
@@ -653,7 +653,7 @@ fn compensation(file: &DesignFile) -> parameters::Compensation {
 }
 
 /// Everything the scenario depends on.
-struct Play<'a> {
+struct ScenarioContext<'a> {
     scenario: &'a schema::Scenario,
     known: Option<&'a KnownDisturbance>,
     tracked: &'a [usize],
@@ -663,7 +663,7 @@ struct Play<'a> {
     folder: &'a Path,
 }
 
-impl Play<'_> {
+impl ScenarioContext<'_> {
     fn resolve(&self) -> Result<Scenario, String> {
         let given = self.scenario;
         let steps = given.steps.map_or(Ok(defaults::STEPS), |steps| {

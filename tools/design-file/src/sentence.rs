@@ -1,13 +1,13 @@
 //! One sentence for whatever a parser complains about.
 
-use crate::suggest;
+use crate::{Error, suggest};
 use serde_path_to_error::{Path, Segment};
 
 /// Longest quotation from the user's file.
 const QUOTATION: usize = 60;
 
-/// Where a byte of the text is, as a person counts.
-pub fn position(text: &str, offset: usize) -> String {
+/// Line and column of a byte of the text, from 1.
+pub fn place(text: &str, offset: usize) -> (usize, usize) {
     let before = &text.as_bytes()[..offset.min(text.len())];
     let line = before.iter().filter(|&&byte| byte == b'\n').count() + 1;
     let start = before
@@ -15,25 +15,36 @@ pub fn position(text: &str, offset: usize) -> String {
         .rposition(|&b| b == b'\n')
         .map_or(0, |at| at + 1);
     let column = String::from_utf8_lossy(&before[start..]).chars().count() + 1;
+    (line, column)
+}
+
+fn position(text: &str, offset: usize) -> String {
+    let (line, column) = place(text, offset);
     format!("line {line}, column {column}")
 }
 
 /// A syntax error as one sentence.
-pub fn syntax(text: &str, error: &toml::de::Error) -> String {
+pub(crate) fn syntax(text: &str, error: &toml::de::Error) -> Error {
     let at = error.span().map_or(0, |span| span.start);
-    format!(
+    let sentence = format!(
         "{}: this is not TOML ({}): correct the syntax there",
         position(text, at),
         one_line(error.message())
-    )
+    );
+    Error {
+        line: Some(place(text, at).0),
+        ..Error::of_file(sentence)
+    }
 }
 
 /// A value that does not fit the schema as one sentence: place, key, what is wrong, what to do.
-pub fn mismatch(text: &str, path: &Path, error: &toml::de::Error) -> String {
-    let place = match error.span() {
-        Some(span) if span.start > 0 => format!("{}: ", position(text, span.start)),
-        _ => String::new(),
-    };
+pub(crate) fn mismatch(text: &str, path: &Path, error: &toml::de::Error) -> Error {
+    let start = error
+        .span()
+        .map(|span| span.start)
+        .filter(|&start| start > 0);
+    let place_of = |start| format!("{}: ", position(text, start));
+    let place_words = start.map(place_of).unwrap_or_default();
     let message = one_line(error.message());
     let quoted = quotations(&message);
     let table = key(path);
@@ -45,32 +56,30 @@ pub fn mismatch(text: &str, path: &Path, error: &toml::de::Error) -> String {
             join(&table, name)
         }
     };
-    match (
+    let (key, what) = match (
         &quoted[..],
         message.split_once('`').map(|(head, _)| head.trim()),
     ) {
-        ([field], Some("missing field")) => {
-            format!("{place}{} is missing: add it", inside(field))
-        }
-        ([field, known @ ..], Some("unknown field")) => format!(
-            "{place}{} is not a known key: {}",
+        ([field], Some("missing field")) => (inside(field), " is missing: add it".into()),
+        ([field, known @ ..], Some("unknown field")) => (
             inside(&shorten(field)),
-            suggest::nearest(field, known)
+            format!(" is not a known key: {}", suggest::nearest(field, known)),
         ),
-        ([value, known @ ..], Some("unknown variant")) => format!(
-            "{place}{table} = \"{}\" is not a known value: {}",
-            shorten(value),
-            suggest::nearest(value, known)
-        ),
-        _ => format!(
-            "{place}{}{}: correct the value",
-            if table.is_empty() {
-                String::new()
-            } else {
-                format!("{table}: ")
-            },
-            plain_types(&message)
-        ),
+        ([value, known @ ..], Some("unknown variant")) => {
+            let known = suggest::nearest(value, known);
+            let what = format!(" = \"{}\" is not a known value: {known}", shorten(value));
+            (table, what)
+        }
+        _ => {
+            let separator = if table.is_empty() { "" } else { ": " };
+            let what = format!("{separator}{}: correct the value", plain_types(&message));
+            (table, what)
+        }
+    };
+    Error {
+        line: start.map(|start| place(text, start).0),
+        key: (!key.is_empty()).then(|| key.clone()),
+        ..Error::of_file(format!("{place_words}{key}{what}"))
     }
 }
 

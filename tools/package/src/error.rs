@@ -16,6 +16,14 @@ pub enum Error {
         /// The library that was looked for.
         library: PathBuf,
     },
+    /// A platform was asked for that has no binaries here.
+    #[error("platforms: {platform} has no FMU binaries here: give one or more of {}", built.join(", "))]
+    NoPlatform {
+        /// The platform.
+        platform: String,
+        /// Those that have some.
+        built: Vec<&'static str>,
+    },
     /// A binary that was found cannot be read.
     #[error("cannot read {} ({source}): build it again", library.display())]
     Binary {

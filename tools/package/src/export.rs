@@ -79,6 +79,8 @@ pub struct Options {
     pub binaries: PathBuf,
     /// Whether to write the SSP package that holds both FMUs connected.
     pub ssp: bool,
+    /// Which platforms to pack; all that are built when absent.
+    pub platforms: Option<Vec<String>>,
 }
 
 /// What an export wrote.
@@ -124,7 +126,7 @@ pub fn export(design: &Design, options: &Options) -> Result<Exported, Error> {
         resource,
         interface: Interface::from(design),
         runs: documentation::runs(design),
-        binaries: Binaries::find(&options.binaries)?,
+        binaries: Binaries::find(options)?,
     };
     let mut fmus = Contents::new();
     for kind in &KINDS {
@@ -270,12 +272,34 @@ struct Binaries {
 }
 
 impl Binaries {
-    /// All that are built. For this machine's own platform the newest, else the portable ones.
-    fn find(folder: &Path) -> Result<Vec<Self>, Error> {
-        let found = Self::all(folder);
-        match found.iter().all(|binaries| binaries.outdated) {
-            true => Err(Error::NoBinaries {
+    /// All that are built and wanted. For this machine's own platform the newest, else the portable
+    /// ones.
+    fn find(options: &Options) -> Result<Vec<Self>, Error> {
+        let folder = &options.binaries;
+        let mut found = Self::all(folder);
+        if found.iter().all(|binaries| binaries.outdated) {
+            return Err(Error::NoBinaries {
                 library: folder.join(host_library(CONTROLLER)),
+            });
+        }
+        if let Some(wanted) = &options.platforms {
+            found.retain(|binaries| !binaries.outdated);
+            let built = |name: &&String| found.iter().any(|b| b.platform.name == name.as_str());
+            if let Some(missing) = wanted.iter().find(|name| !built(name)) {
+                return Err(Error::NoPlatform {
+                    platform: missing.clone(),
+                    built: found
+                        .iter()
+                        .map(|binaries| binaries.platform.name)
+                        .collect(),
+                });
+            }
+            found.retain(|binaries| wanted.iter().any(|name| name == binaries.platform.name));
+        }
+        match found.is_empty() {
+            true => Err(Error::NoPlatform {
+                platform: "(none)".into(),
+                built: Self::all(folder).iter().map(|b| b.platform.name).collect(),
             }),
             false => Ok(found),
         }

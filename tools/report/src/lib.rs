@@ -11,15 +11,16 @@
 //! size in pixels and spend a third of a phone's width on the legend.
 
 mod axis;
-pub mod baselines;
 mod decimate;
 mod demo;
 pub mod documentation;
 pub mod figure;
 pub mod page;
 pub mod simulate;
+pub mod style;
 pub mod summary;
 mod svg;
+pub mod table;
 pub mod text;
 pub mod warnings;
 

@@ -1,9 +1,10 @@
 //! Every variant of the loop, simulated natively and written down sample by sample.
 
-use crate::baselines;
+use crate::table::{Table, number};
 use crate::warnings;
 use ftc_control::Controller;
 use ftc_design::Design;
+use ftc_simulate::baselines::comparison;
 use ftc_simulate::closed_loop::{Merits, Record};
 use ftc_simulate::{PlantSimulator, Trajectory, Variant, run};
 use serde_json::{Map, Value, json};
@@ -17,6 +18,8 @@ pub struct Simulation {
     pub summary: String,
     /// What its user should know of the design and of the runs.
     pub warnings: Vec<String>,
+    /// Every variant and baseline, sample by sample.
+    pub trajectories: Vec<Trajectory>,
 }
 
 /// Runs the scenario in every variant, and with every baseline if asked for:
@@ -32,8 +35,10 @@ pub fn simulate(
     let mut trajectories = trajectories(design);
     let mut bound = None;
     if baselines {
-        trajectories.extend(baselines::trajectories(design, &plant(design))?);
-        bound = Some(baselines::bound(design, &trajectories[0]));
+        trajectories.extend(
+            comparison::trajectories(design, &plant(design)).map_err(|error| error.to_string())?,
+        );
+        bound = Some(comparison::bound(design, &trajectories[0]));
     }
     warnings.extend(warnings::of_runs(design, &trajectories));
     let csv = table(design, &trajectories).map_err(|error| error.to_string())?;
@@ -51,6 +56,7 @@ pub fn simulate(
         files,
         summary: summary(design, &trajectories, bound.as_deref()),
         warnings,
+        trajectories,
     })
 }
 
@@ -77,12 +83,12 @@ pub fn one(design: &Design, variant: Variant) -> Trajectory {
 }
 
 /// One row per sample: `t`, `mode` and the signals of the scenario, then those of each variant.
-fn table(design: &Design, trajectories: &[Trajectory]) -> Result<Vec<u8>, csv::Error> {
-    let mut writer = csv::Writer::from_writer(Vec::new());
+fn table(design: &Design, trajectories: &[Trajectory]) -> csv::Result<Vec<u8>> {
     let records = trajectories.first().map_or(&[][..], |run| &run.records);
-    if let Some(first) = records.first() {
-        writer.write_record(header(first, trajectories))?;
-    }
+    let Some(first) = records.first() else {
+        return Ok(Vec::new());
+    };
+    let mut table = Table::new(header(first, trajectories))?;
     let mut row = Vec::new();
     for (at, record) in records.iter().enumerate() {
         row.clear();
@@ -104,11 +110,9 @@ fn table(design: &Design, trajectories: &[Trajectory]) -> Result<Vec<u8>, csv::E
                     .map(|&flag| u8::from(flag).to_string()),
             );
         }
-        writer.write_record(&row)?;
+        table.row(&row)?;
     }
-    writer
-        .into_inner()
-        .map_err(|error| error.into_error().into())
+    table.finish()
 }
 
 /// Signals that are the same in every variant.
@@ -150,11 +154,6 @@ fn header(record: &Record, trajectories: &[Trajectory]) -> Vec<String> {
         names.extend(vector(&prefix, "fault", record.flagged.len()));
     }
     names
-}
-
-/// The shortest text that reads back as the same double.
-fn number(value: f64) -> String {
-    format!("{value:?}")
 }
 
 /// Per variant `mse` and `vaf`, each measured and true, one number per tracked output; of the

@@ -33,7 +33,7 @@ const HORIZON: usize = 25;
 const INPUT_WEIGHT: f64 = 1e-3;
 
 /// Who closes the loop, in the order of the tables.
-const CONTENDERS: [Variant; 4] = [
+const COMPARED: [Variant; 4] = [
     Variant::Ftc,
     Variant::Predictive,
     Variant::ToldTheFault,
@@ -110,7 +110,7 @@ struct Run {
     outputs: Vec<OutputMerits>,
 }
 
-/// Every contender under one fault.
+/// Every controller under one fault.
 struct Trial {
     case: Case,
     runs: Vec<Run>,
@@ -157,13 +157,13 @@ pub fn run(progress: Progress) -> Result<Findings, String> {
     Ok(Findings {
         name: "converter",
         numbers: json!({ "runs": runs }),
-        table: table(&runs).map_err(|error| error.to_string())?,
+        table: table(&runs)?,
         summary: summary(&trials),
         page: page::page(&design, &trials),
     })
 }
 
-/// Every contender under one fault.
+/// Every controller under one fault.
 fn attempt(design: &Design, case: Case) -> Result<Trial, String> {
     let mut scenario = design.scenario.clone();
     scenario.events = case
@@ -182,7 +182,7 @@ fn attempt(design: &Design, case: Case) -> Result<Trial, String> {
         scenario,
     );
     let controller = Controller::new(design.controller.clone());
-    let trajectories = CONTENDERS
+    let trajectories = COMPARED
         .into_iter()
         .map(|variant| match variant {
             Variant::Predictive => predict(design, &plant, HORIZON, INPUT_WEIGHT),
@@ -233,51 +233,30 @@ fn predict(
 }
 
 /// One row per output and run.
-fn table(runs: &[&Run]) -> Result<Vec<u8>, csv::Error> {
-    let mut writer = csv::Writer::from_writer(Vec::new());
-    writer.write_record([
-        "fault",
-        "faulty_sensor",
-        "controller",
-        "output",
-        "true_mse",
-        "true_vaf",
-        "measured_mse",
-        "measured_vaf",
-    ])?;
-    for run in runs {
-        for merit in &run.outputs {
-            let names = [
-                run.fault,
-                run.sensor.as_deref().unwrap_or_default(),
-                run.controller.key(),
-                &merit.output,
-            ];
-            let numbers = [
-                merit.truth.mse,
-                merit.truth.vaf,
-                merit.measured.mse,
-                merit.measured.vaf,
-            ];
-            let numbers = numbers.iter().map(|value| format!("{value:?}"));
-            writer.write_record(names.map(String::from).into_iter().chain(numbers))?;
-        }
-    }
-    writer
-        .into_inner()
-        .map_err(|error| error.into_error().into())
+fn table(runs: &[&Run]) -> Result<Vec<u8>, String> {
+    let row = |run: &Run| {
+        vec![
+            run.fault.to_string(),
+            run.sensor.clone().unwrap_or_default(),
+            run.controller.key().to_string(),
+        ]
+    };
+    experiment::table(
+        &["fault", "faulty_sensor", "controller"],
+        runs.iter().map(|run| (row(run), run.outputs.as_slice())),
+    )
 }
 
 /// True VAF of the faulty output, for the terminal.
 fn summary(trials: &[Trial]) -> String {
     let mut text = format!("{:<18}", "true VAF in %");
-    for variant in CONTENDERS {
+    for variant in COMPARED {
         let _ = write!(text, "{:>20}", name(variant));
     }
     text.push('\n');
     for trial in trials {
         let _ = write!(text, "{:<18}", trial.case.key);
-        for variant in CONTENDERS {
+        for variant in COMPARED {
             let values: Vec<String> = trial
                 .vaf(variant)
                 .iter()

@@ -1,19 +1,19 @@
 //! What both experiments share: from an example to a design, from runs to numbers and curves.
 
-use design_file::assemble as design_request;
 use ftc_design::assembly::{Request, assemble};
 use ftc_design::{Design, DesignError};
+use ftc_simulate::Trajectory;
 use ftc_simulate::closed_loop::Record;
 use ftc_simulate::metrics::Merit;
-use ftc_simulate::{Trajectory, Variant};
-use report::figure::{Dash, Figure, Ink, Mark, Point, Series, Weight};
+use report::figure::{Figure, Mark, Point};
+use report::table::{Table, number};
 use serde::Serialize;
 use std::path::Path;
 
 /// The request of a design file that is part of this program.
 pub fn request(text: &str) -> Result<Request, String> {
-    let file = design_file::parse(text)?;
-    design_request::request(&file, Path::new(""))
+    let loaded = design_file::parse(text, Path::new("")).map_err(|error| error.to_string())?;
+    Ok(loaded.request)
 }
 
 /// The design, or one sentence.
@@ -53,32 +53,40 @@ pub fn true_error(merits: &[OutputMerits]) -> f64 {
     merits.iter().map(|merit| merit.truth.mse).sum()
 }
 
+/// One row per output of every run: the names that `names` gives, then the figures of merit.
+pub fn table<'a>(
+    names: &[&str],
+    runs: impl Iterator<Item = (Vec<String>, &'a [OutputMerits])>,
+) -> Result<Vec<u8>, String> {
+    let merits = [
+        "output",
+        "true_mse",
+        "true_vaf",
+        "measured_mse",
+        "measured_vaf",
+    ];
+    let mut table = Table::new(names.iter().chain(&merits)).map_err(|error| error.to_string())?;
+    for (names, outputs) in runs {
+        for OutputMerits {
+            output,
+            truth,
+            measured,
+        } in outputs
+        {
+            let numbers = [truth.mse, truth.vaf, measured.mse, measured.vaf].map(number);
+            let row = names.iter().chain([output]).chain(&numbers);
+            table.row(row).map_err(|error| error.to_string())?;
+        }
+    }
+    table.finish().map_err(|error| error.to_string())
+}
+
 /// A signal of a run over time in seconds.
 pub fn curve(run: &Trajectory, sample_time: f64, signal: impl Fn(&Record) -> f64) -> Vec<Point> {
     run.records
         .iter()
         .map(|record| [record.tick as f64 * sample_time, signal(record)])
         .collect()
-}
-
-/// A curve in the look its controller has in every figure.
-pub fn series(name: &str, variant: Variant, points: Vec<Point>) -> Series {
-    let series = Series::new(name, points);
-    match variant {
-        Variant::Ftc => series.ink(Ink::Blue),
-        Variant::NoFtc => series.ink(Ink::Vermilion).dash(Dash::Dashed).secondary(),
-        Variant::ToldTheFault => series.ink(Ink::Green).weight(Weight::Broad),
-        Variant::Additive => series.ink(Ink::Ochre).dash(Dash::Dashed).secondary(),
-        Variant::Predictive => series.ink(Ink::Purple).dash(Dash::Dashed).secondary(),
-    }
-}
-
-/// The reference in its look.
-pub fn reference(points: Vec<Point>) -> Series {
-    Series::new("reference", points)
-        .ink(Ink::Text)
-        .dash(Dash::Dotted)
-        .step()
 }
 
 /// Vertical lines where the mode changes.

@@ -16,6 +16,7 @@ use ftc_design::{Design, Objective};
 use ftc_plant::scenario::Waveform;
 use ftc_simulate::baselines::deadbeat_bound;
 use ftc_simulate::{PlantSimulator, Trajectory, Variant, run as simulate};
+use report::table::number;
 use serde::Serialize;
 use serde_json::json;
 use std::fmt::Write;
@@ -38,7 +39,7 @@ const REFERENCES: [&str; 4] = ["constant", "square", "sine", "levels"];
 /// What closes the loop in one row.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
-enum Contender {
+enum ControllerKind {
     /// The sound design: gains of T2, reference estimator, virtual sensor.
     Proposed,
     /// The same, told the fault.
@@ -53,7 +54,7 @@ enum Contender {
     NoFtc,
 }
 
-impl Contender {
+impl ControllerKind {
     const ALL: [Self; 6] = [
         Self::Proposed,
         Self::ToldTheFault,
@@ -111,7 +112,7 @@ struct Run {
     channel: &'static str,
     reference: &'static str,
     noise: f64,
-    controller: Contender,
+    controller: ControllerKind,
     outputs: Vec<OutputMerits>,
     /// True mean square error over that of the controller told the fault.
     over_told: f64,
@@ -140,30 +141,29 @@ impl Designs {
         })
     }
 
-    fn controller(&self, contender: Contender) -> ControllerParameters {
-        match contender {
-            Contender::Proposed | Contender::ToldTheFault | Contender::NoFtc => {
+    fn controller(&self, controller: ControllerKind) -> ControllerParameters {
+        match controller {
+            ControllerKind::Proposed | ControllerKind::ToldTheFault | ControllerKind::NoFtc => {
                 self.proposed.controller.clone()
             }
-            Contender::PrintedCompensation => ControllerParameters {
+            ControllerKind::PrintedCompensation => ControllerParameters {
                 compensation: Compensation::Additive,
                 ..self.proposed.controller.clone()
             },
-            Contender::AdditiveReference => self.additive.controller.clone(),
-            Contender::AdditiveSliding => self.sliding.controller.clone(),
+            ControllerKind::AdditiveReference => self.additive.controller.clone(),
+            ControllerKind::AdditiveSliding => self.sliding.controller.clone(),
         }
     }
 
-    /// Every contender under one reference.
-    fn compete(&self, reference: &[Waveform]) -> Vec<(Contender, Trajectory)> {
+    /// Every controller under one reference.
+    fn run_all(&self, reference: &[Waveform]) -> Vec<(ControllerKind, Trajectory)> {
         let mut scenario = self.proposed.scenario.clone();
         scenario.reference = reference.to_vec();
         let plant = PlantSimulator::new(self.proposed.controller.plant.clone(), scenario);
-        Contender::ALL
-            .map(|contender| {
-                let controller = Controller::new(self.controller(contender));
-                let trajectory = simulate(&plant, &controller, contender.variant());
-                (contender, trajectory)
+        ControllerKind::ALL
+            .map(|kind| {
+                let controller = Controller::new(self.controller(kind));
+                (kind, simulate(&plant, &controller, kind.variant()))
             })
             .into()
     }
@@ -199,13 +199,13 @@ struct Record {
 /// The scenario whose curves are drawn.
 struct Shown {
     design: Design,
-    trajectories: Vec<(Contender, Trajectory)>,
+    trajectories: Vec<(ControllerKind, Trajectory)>,
 }
 
 impl Shown {
-    fn of(&self, contender: Contender) -> Option<&Trajectory> {
+    fn of(&self, controller: ControllerKind) -> Option<&Trajectory> {
         let mut all = self.trajectories.iter();
-        all.find(|(who, _)| *who == contender).map(|(_, run)| run)
+        all.find(|(who, _)| *who == controller).map(|(_, run)| run)
     }
 }
 
@@ -234,7 +234,7 @@ pub fn run(progress: Progress) -> Result<Findings, String> {
             "references": record.references,
             "runs": record.runs,
         }),
-        table: table(&record.runs).map_err(|error| error.to_string())?,
+        table: table(&record.runs)?,
         summary: summary(&record.runs),
     })
 }
@@ -244,7 +244,7 @@ impl Record {
         let designs = Designs::new(request)?;
         for reference in REFERENCES {
             let signals = waveforms(reference, request);
-            let trajectories = designs.compete(&signals);
+            let trajectories = designs.run_all(&signals);
             self.measure((channel, reference, noise), &designs, &trajectories);
             if (channel, reference) == ("state", "levels") && noise > 0.0 {
                 self.shown = Some(Shown {
@@ -260,15 +260,15 @@ impl Record {
         &mut self,
         (channel, reference, noise): (&'static str, &'static str, f64),
         designs: &Designs,
-        trajectories: &[(Contender, Trajectory)],
+        trajectories: &[(ControllerKind, Trajectory)],
     ) {
-        let found: Vec<(Contender, Vec<OutputMerits>)> = trajectories
+        let found: Vec<(ControllerKind, Vec<OutputMerits>)> = trajectories
             .iter()
-            .map(|(contender, run)| (*contender, merits(run, &designs.proposed)))
+            .map(|(controller, run)| (*controller, merits(run, &designs.proposed)))
             .collect();
         let told = found
             .iter()
-            .find(|(contender, _)| *contender == Contender::ToldTheFault)
+            .find(|(controller, _)| *controller == ControllerKind::ToldTheFault)
             .map_or(f64::NAN, |(_, merits)| true_error(merits));
         let signals = trajectories
             .first()
@@ -290,70 +290,48 @@ impl Record {
             }));
     }
 
-    /// The run of a contender in the scenario whose curves are drawn.
+    /// The run of a controller in the scenario whose curves are drawn.
     fn run(
         &self,
         channel: &str,
         reference: &str,
         noise: f64,
-        contender: Contender,
+        controller: ControllerKind,
     ) -> Option<&Run> {
         self.runs.iter().find(|run| {
-            (run.channel, run.reference, run.controller) == (channel, reference, contender)
+            (run.channel, run.reference, run.controller) == (channel, reference, controller)
                 && run.noise == noise
         })
     }
 
-    /// The largest of a contender's errors over those of the controller told the fault.
-    fn worst_over_told(&self, contender: Contender) -> f64 {
-        let runs = self.runs.iter().filter(|run| run.controller == contender);
+    /// The largest of a controller's errors over those of the controller told the fault.
+    fn worst_over_told(&self, controller: ControllerKind) -> f64 {
+        let runs = self.runs.iter().filter(|run| run.controller == controller);
         runs.map(|run| run.over_told).fold(0.0, f64::max)
     }
 
     /// The smallest of them.
-    fn best_over_told(&self, contender: Contender) -> f64 {
-        let runs = self.runs.iter().filter(|run| run.controller == contender);
+    fn best_over_told(&self, controller: ControllerKind) -> f64 {
+        let runs = self.runs.iter().filter(|run| run.controller == controller);
         runs.map(|run| run.over_told).fold(f64::INFINITY, f64::min)
     }
 }
 
 /// One row per output and run.
-fn table(runs: &[Run]) -> Result<Vec<u8>, csv::Error> {
-    let mut writer = csv::Writer::from_writer(Vec::new());
-    writer.write_record([
-        "disturbance_on",
-        "reference",
-        "noise",
-        "controller",
-        "output",
-        "true_mse",
-        "true_vaf",
-        "measured_mse",
-        "measured_vaf",
-    ])?;
-    for run in runs {
+fn table(runs: &[Run]) -> Result<Vec<u8>, String> {
+    let row = |run: &Run| {
         let controller = json!(run.controller);
-        for merit in &run.outputs {
-            let numbers = [
-                merit.truth.mse,
-                merit.truth.vaf,
-                merit.measured.mse,
-                merit.measured.vaf,
-            ];
-            let names = [
-                run.channel.to_string(),
-                run.reference.to_string(),
-                format!("{:?}", run.noise),
-                controller.as_str().unwrap_or_default().to_string(),
-                merit.output.clone(),
-            ];
-            let numbers = numbers.iter().map(|value| format!("{value:?}"));
-            writer.write_record(names.into_iter().chain(numbers))?;
-        }
-    }
-    writer
-        .into_inner()
-        .map_err(|error| error.into_error().into())
+        vec![
+            run.channel.to_string(),
+            run.reference.to_string(),
+            number(run.noise),
+            controller.as_str().unwrap_or_default().to_string(),
+        ]
+    };
+    experiment::table(
+        &["disturbance_on", "reference", "noise", "controller"],
+        runs.iter().map(|run| (row(run), run.outputs.as_slice())),
+    )
 }
 
 /// The worst and best ratios, for the terminal.
@@ -362,15 +340,15 @@ fn summary(runs: &[Run]) -> String {
         "{:<34}{:>12}{:>14}\n",
         "true MSE over told the fault", "best", "worst"
     );
-    for contender in Contender::ALL {
+    for controller in ControllerKind::ALL {
         let ratios = runs
             .iter()
-            .filter(|run| run.controller == contender)
+            .filter(|run| run.controller == controller)
             .map(|run| run.over_told);
         let (best, worst) = ratios.fold((f64::INFINITY, 0.0), |(low, high): (f64, f64), ratio| {
             (low.min(ratio), high.max(ratio))
         });
-        let _ = writeln!(text, "{:<34}{best:>12.4}{worst:>14.4}", contender.name());
+        let _ = writeln!(text, "{:<34}{best:>12.4}{worst:>14.4}", controller.name());
     }
     text
 }

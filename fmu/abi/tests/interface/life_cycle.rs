@@ -1,4 +1,6 @@
 //! Every function in every state, against the standard's table written down once more.
+//!
+//! promise: legal-calls
 
 use crate::host::*;
 use crate::phases::*;

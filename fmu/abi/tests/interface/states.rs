@@ -1,4 +1,6 @@
 //! Saved states: rollback, bytes, reset.
+//!
+//! promise: saved-states
 
 use crate::host::*;
 use crate::phases::*;

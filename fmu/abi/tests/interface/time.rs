@@ -1,4 +1,6 @@
 //! Ticks are counted by time: any steps give the same values at common times.
+//!
+//! promise: counted-time
 
 use crate::host::*;
 use fmu_abi::clock::{Clock, Event};

@@ -1,4 +1,6 @@
 //! Directional derivatives through the C interface, against central differences of whole steps.
+//!
+//! promise: exact-derivatives
 
 use crate::Pair;
 use fmu_host::Coupling::GaussSeidel;

@@ -1,4 +1,6 @@
 //! Random sequences of calls with random arguments: what the fuzzer does, the same in every run.
+//!
+//! promise: hostile-calls
 
 use crate::Pair;
 use arbitrary::{Arbitrary, Unstructured};

@@ -1,4 +1,6 @@
 //! Resources that are not those of the FMU: one sentence in the log, and no instance.
+//!
+//! promise: damaged-resources
 
 use crate::Pair;
 use fmu_host::model::location;

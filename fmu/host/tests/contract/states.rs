@@ -1,4 +1,6 @@
 //! Saved states: whatever changes is in them, and nothing else.
+//!
+//! promise: saved-states
 
 use crate::Pair;
 use fmu_host::Coupling::GaussSeidel;

@@ -1,4 +1,6 @@
 //! Many instances, many threads, and a library that comes and goes.
+//!
+//! promise: independent-instances
 
 use crate::Pair;
 use fmu_host::Coupling::GaussSeidel;

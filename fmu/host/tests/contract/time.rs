@@ -1,4 +1,6 @@
 //! Communication steps of any length, from any start time: the same numbers at common times.
+//!
+//! promise: counted-time
 
 use crate::Pair;
 use fmu_host::Coupling::{self, GaussSeidel, Jacobi};

@@ -12,9 +12,6 @@ const LARGEST_WORK: f64 = 6e11;
 /// Iterations of all solutions of one problem.
 const ITERATIONS: f64 = 45.0;
 
-/// How many sacrifices are tried before the central path is.
-const SMALL_SACRIFICES: usize = 2;
-
 /// How many points of the central path are tried.
 const CENTRED: usize = 5;
 
@@ -44,14 +41,25 @@ impl Road<'_> {
             let regulated = Frame::of_regulated(&self.models, group, self.spec.decay)?;
             self.direct_level(&regulated.with_signals(&self.models, group), group)
         });
-        let least = least.collect::<Option<Vec<_>>>()?;
-        let (small, large) = SACRIFICES.split_at(SMALL_SACRIFICES);
-        let largest_margin = |&sacrifice: &f64| self.with_margin(&groups, &least, sacrifice);
-        small
-            .iter()
-            .find_map(largest_margin)
+        let mut least = least.collect::<Option<Vec<_>>>()?;
+        let (smallest, others) = SACRIFICES.split_first()?;
+        if let Some(design) = self.with_margin(&groups, &least, *smallest) {
+            return Some(design);
+        }
+        // Once more, in the coordinates that the first answer suggests.
+        for (group, found) in groups.iter().zip(&mut least) {
+            let again = self.direct_level(&found.optimum.frame, group);
+            if let Some(again) = again.filter(|again| again.optimum.level < found.optimum.level) {
+                *found = again;
+            }
+        }
+        self.with_margin(&groups, &least, *smallest)
             .or_else(|| (0..CENTRED).find_map(|back| self.on_path(&groups, &least, back)))
-            .or_else(|| large.iter().find_map(largest_margin))
+            .or_else(|| {
+                others
+                    .iter()
+                    .find_map(|more| self.with_margin(&groups, &least, *more))
+            })
     }
 
     /// Gains of largest margin at the least levels but for a `sacrifice`, certified.

@@ -2,6 +2,8 @@
 
 #[cfg(feature = "solver")]
 mod additive;
+#[cfg(feature = "solver")]
+pub mod comparison;
 mod deadbeat;
 #[cfg(feature = "solver")]
 pub mod predictive;

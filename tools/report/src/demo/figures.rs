@@ -3,6 +3,7 @@
 use super::events::{any_fault_intervals, fault_intervals};
 use super::{RANKING, find, name_of, unit_of, variant_name};
 use crate::figure::{Dash, Figure, Ink, Mark, Point, Series, Weight};
+use crate::style;
 use crate::text::with_unit;
 use ftc_control::parameters::EstimatorMethod;
 use ftc_design::Design;
@@ -118,12 +119,7 @@ impl<'a> Scene<'a> {
             TIME,
             label,
         )
-        .with(
-            Series::new("measured", self.points(run, |record| record.y[output]))
-                .ink(Ink::Faint)
-                .weight(Weight::Thin)
-                .secondary(),
-        );
+        .with(style::measured(self.points(run, |record| record.y[output])));
         for series in self.variants(|record| record.y_true[output]) {
             figure = figure.with(series);
         }
@@ -136,13 +132,7 @@ impl<'a> Scene<'a> {
             .position(|row| *row == output)
         {
             let reference = self.points(run, |record| record.reference[row]);
-            figure = figure.with(
-                Series::new("reference", reference)
-                    .ink(Ink::Text)
-                    .dash(Dash::Dotted)
-                    .weight(Weight::Normal)
-                    .step(),
-            );
+            figure = figure.with(style::reference(reference));
         }
         figure
             .shade(FAULTY, self.times(&fault_intervals(run, output)))
@@ -166,12 +156,7 @@ impl<'a> Scene<'a> {
             TIME,
             with_unit(&format!("fault of {name}"), unit_of(outputs, sensor)),
         )
-        .with(
-            Series::new("true fault", truth)
-                .ink(Ink::Ochre)
-                .weight(Weight::Broad)
-                .step(),
-        )
+        .with(style::true_fault(truth))
         .with(Series::new("estimate", self.points(run, |record| record.f_hat[sensor])).step())
         .shade(FAULTY, self.times(&fault_intervals(run, sensor)))
         .mark(&self.marks)
@@ -239,14 +224,8 @@ impl<'a> Scene<'a> {
             .rev()
             .filter_map(|variant| find(self.trajectories, variant))
             .map(|run| {
-                let series = Series::new(variant_name(run.variant), self.points(run, &signal));
-                match run.variant {
-                    Variant::Ftc => series.ink(Ink::Blue),
-                    Variant::NoFtc => series.ink(Ink::Vermilion).dash(Dash::Dashed).secondary(),
-                    Variant::ToldTheFault => series.ink(Ink::Green).weight(Weight::Broad),
-                    Variant::Additive => series.ink(Ink::Ochre).dash(Dash::Dashed).secondary(),
-                    Variant::Predictive => series.ink(Ink::Purple).dash(Dash::Chain).secondary(),
-                }
+                let points = self.points(run, &signal);
+                style::variant(variant_name(run.variant), run.variant, points)
             })
             .collect()
     }

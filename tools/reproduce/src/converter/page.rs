@@ -1,18 +1,19 @@
 //! The page of the converter.
 
-use super::{CONTENDERS, FAULTY, HORIZON, INPUT_WEIGHT, REPORTED, Trial, name};
-use crate::experiment::{OutputMerits, curve, figure, reference, series};
+use super::{COMPARED, FAULTY, HORIZON, INPUT_WEIGHT, REPORTED, Trial, name};
+use crate::experiment::{OutputMerits, curve, figure};
 use ftc_design::Design;
 use ftc_plant::Truth;
 use ftc_simulate::closed_loop::Record;
 use ftc_simulate::{Trajectory, Variant};
 use report::events::fault_intervals;
-use report::figure::{Figure, Ink, Series, Weight};
+use report::figure::{Figure, Series};
 use report::page::{Block, Column, KeyNumber, Page, Row, Section, Table};
+use report::style;
 use report::text::{aligned, number, significant, with_unit};
 
 /// The two that are compared.
-const RIVALS: [Variant; 2] = [Variant::Ftc, Variant::Predictive];
+const PAIR: [Variant; 2] = [Variant::Ftc, Variant::Predictive];
 
 /// Faults whose curves are drawn, by key.
 const DRAWN: [&str; 5] = [
@@ -162,7 +163,7 @@ fn joined(values: &[f64]) -> String {
 fn table_2(trials: &[Trial]) -> Table {
     let mean = |values: Vec<f64>| values.iter().sum::<f64>() / values.len() as f64;
     let over = |pick: fn(&OutputMerits) -> f64, of: fn(&Trial) -> bool| {
-        RIVALS.map(|variant| {
+        PAIR.map(|variant| {
             let judged = trials.iter().filter(|trial| of(trial));
             mean(
                 judged
@@ -225,12 +226,12 @@ fn sensor_name(trial: &Trial) -> &'static str {
 
 fn every_fault(trials: &[Trial]) -> Table {
     let mut columns = vec![Column::name("sensor"), Column::name("fault")];
-    columns.extend(CONTENDERS.map(|variant| Column::number(name(variant))));
+    columns.extend(COMPARED.map(|variant| Column::number(name(variant))));
     let rows = trials.iter().enumerate().map(|(place, trial)| {
         let first = place == 0 || sensor_name(&trials[place - 1]) != sensor_name(trial);
         let sensor = if first { sensor_name(trial) } else { "" };
         let mut cells = vec![sensor.to_string(), trial.case.words.clone()];
-        cells.extend(CONTENDERS.map(|variant| {
+        cells.extend(COMPARED.map(|variant| {
             let values = trial.vaf(variant);
             let values: Vec<String> = values.iter().map(|v| aligned(*v, 2)).collect();
             values.join(" / ")
@@ -287,10 +288,10 @@ fn notes(trials: &[Trial]) -> Vec<String> {
 fn drawn(design: &Design, trial: &Trial) -> Option<Section> {
     let (sensor, _) = trial.case.fault?;
     let run = trial.of(Variant::Ftc)?;
-    let rivals: Vec<&Trajectory> = RIVALS.iter().rev().filter_map(|v| trial.of(*v)).collect();
+    let others: Vec<&Trajectory> = PAIR.iter().rev().filter_map(|v| trial.of(*v)).collect();
     let heading = format!("{}: {}", sensor_name(trial), trial.case.words);
     let section = Section::new(capitalised(&heading)).figures(vec![
-        response(design, trial, run, &rivals, sensor),
+        response(design, trial, run, &others, sensor),
         estimate(design, trial, run, sensor),
     ]);
     Some(section)
@@ -312,7 +313,7 @@ fn response(
     design: &Design,
     trial: &Trial,
     run: &Trajectory,
-    rivals: &[&Trajectory],
+    others: &[&Trajectory],
     sensor: usize,
 ) -> Figure {
     let te = design.controller.plant.sample_time;
@@ -327,11 +328,13 @@ fn response(
         ),
         &fault_intervals(run, sensor),
     );
-    for rival in rivals {
-        let points = curve(rival, te, |record| record.y_true[sensor]);
-        figure = figure.with(series(name(rival.variant), rival.variant, points));
+    for other in others {
+        let points = curve(other, te, |record| record.y_true[sensor]);
+        figure = figure.with(style::variant(name(other.variant), other.variant, points));
     }
-    figure.with(reference(curve(run, te, |record| record.reference[sensor])))
+    figure.with(style::reference(curve(run, te, |record| {
+        record.reference[sensor]
+    })))
 }
 
 fn estimate(design: &Design, trial: &Trial, run: &Trajectory, sensor: usize) -> Figure {
@@ -354,12 +357,7 @@ fn estimate(design: &Design, trial: &Trial, run: &Trajectory, sensor: usize) -> 
         ),
         &fault_intervals(run, sensor),
     )
-    .with(
-        Series::new("true fault", truth)
-            .ink(Ink::Green)
-            .weight(Weight::Broad)
-            .step(),
-    )
+    .with(style::true_fault(truth))
     .with(Series::new("estimate", found).step())
 }
 
@@ -367,7 +365,7 @@ fn estimate(design: &Design, trial: &Trial, run: &Trajectory, sensor: usize) -> 
 fn all(trials: &[Trial]) -> Table {
     let mut rows = Vec::new();
     for trial in trials {
-        for (place, variant) in CONTENDERS.into_iter().enumerate() {
+        for (place, variant) in COMPARED.into_iter().enumerate() {
             let title = match trial.case.fault {
                 None => trial.case.words.clone(),
                 Some(_) => format!("{}: {}", sensor_name(trial), trial.case.words),

@@ -2,7 +2,7 @@
 
 use super::printed::{self, Absorption, DoubledDisturbance, Latency};
 use super::reachable::{REPORTED, largest_variance};
-use super::{Contender, NOISES, REFERENCES, Record};
+use super::{ControllerKind, NOISES, REFERENCES, Record};
 use ftc_design::as_printed::PrintedVerdict;
 use report::text::{aligned, number};
 use serde::Serialize;
@@ -195,11 +195,11 @@ impl Claims {
     }
 }
 
-fn range(record: &Record, contender: Contender) -> String {
+fn range(record: &Record, controller: ControllerKind) -> String {
     format!(
         "{} to {} times",
-        number(record.best_over_told(contender)),
-        number(record.worst_over_told(contender))
+        number(record.best_over_told(controller)),
+        number(record.worst_over_told(controller))
     )
 }
 
@@ -210,9 +210,9 @@ fn estimation(record: &Record) -> Claim {
         format!(
             "true MSE over that of a controller told the fault: additive FTC with the window as printed {}, \
              with the reference window {}; proposed, at most {} times",
-            range(record, Contender::AdditiveSliding),
-            range(record, Contender::AdditiveReference),
-            aligned(record.worst_over_told(Contender::Proposed), 4)
+            range(record, ControllerKind::AdditiveSliding),
+            range(record, ControllerKind::AdditiveReference),
+            aligned(record.worst_over_told(ControllerKind::Proposed), 4)
         ),
         "the loop feeds the printed window inputs that already answer to the fault; the healthy database does not depend on them",
     )
@@ -225,8 +225,8 @@ fn compensation(record: &Record) -> Claim {
         format!(
             "with the proposed gains and estimates, {} the true MSE of a controller told the fault; the same estimate \
              taken out of the measurement: at most {} times",
-            range(record, Contender::PrintedCompensation),
-            aligned(record.worst_over_told(Contender::Proposed), 4)
+            range(record, ControllerKind::PrintedCompensation),
+            aligned(record.worst_over_told(ControllerKind::Proposed), 4)
         ),
         "it is exact only where the state estimate is C⁺y at every instant; an observer with memory leaves a \
          transient at each edge of the fault, and f̃ keeps every error of f̂ for ever",
@@ -235,7 +235,7 @@ fn compensation(record: &Record) -> Claim {
 
 /// Measured and true error without any fault tolerance, square reference, disturbance on the state.
 fn metrics(record: &Record) -> Claim {
-    let row = record.run("state", REFERENCES[1], NOISES[0], Contender::NoFtc);
+    let row = record.run("state", REFERENCES[1], NOISES[0], ControllerKind::NoFtc);
     let first = row.and_then(|run| run.outputs.first());
     let (measured, truth) = first.map_or((f64::NAN, f64::NAN), |m| (m.measured.mse, m.truth.mse));
     claim(

@@ -2,11 +2,12 @@
 
 use super::claims::Claims;
 use super::reachable::REPORTED;
-use super::{CHANNELS, Contender, NOISES, REFERENCES, Record, Run, Shown};
-use crate::experiment::{OutputMerits, curve, figure, reference, series};
+use super::{CHANNELS, ControllerKind, NOISES, REFERENCES, Record, Run, Shown};
+use crate::experiment::{OutputMerits, curve, figure};
 use report::events::{any_fault_intervals, fault_intervals};
-use report::figure::{Figure, Ink, Series, Weight};
+use report::figure::{Figure, Series};
 use report::page::{Block, Column, KeyNumber, Page, Row, Section, Table};
+use report::style;
 use report::text::{aligned, number, significant};
 
 /// Everything, the verdicts first.
@@ -20,7 +21,7 @@ pub fn page(record: &Record, claims: &Claims) -> Page {
         Section::new("Which references reach the reported figures")
             .with(Block::Table(reach(record))),
     );
-    sections.push(runs(record).with(Block::Table(contenders())));
+    sections.push(runs(record).with(Block::Table(controllers())));
     Page {
         title: "The paper’s example, reproduced".into(),
         lead: format!(
@@ -28,11 +29,11 @@ pub fn page(record: &Record, claims: &Claims) -> Page {
              section VII-A: two modes, a slow sine as disturbance, both sensors wrong by 0.5 for more than half of the time. \
              The method works, but not as printed: with sound inequalities and a healthy database its true mean square error \
              is at most {} times that of a controller told the fault, in all {} runs.",
-            aligned(record.worst_over_told(Contender::Proposed), 3),
+            aligned(record.worst_over_told(ControllerKind::Proposed), 3),
             record
                 .runs
                 .iter()
-                .filter(|r| r.controller == Contender::Proposed)
+                .filter(|r| r.controller == ControllerKind::Proposed)
                 .count()
         ),
         key_numbers: key_numbers(record, claims),
@@ -55,19 +56,19 @@ fn key_numbers(record: &Record, claims: &Claims) -> Vec<KeyNumber> {
         key(
             format!(
                 "{} ×",
-                aligned(record.worst_over_told(Contender::Proposed), 3)
+                aligned(record.worst_over_told(ControllerKind::Proposed), 3)
             ),
             "the true error of a controller told the fault: proposed FTC, worst of all runs",
         ),
         key(
             format!(
                 "{} ×",
-                number(record.best_over_told(Contender::AdditiveSliding))
+                number(record.best_over_told(ControllerKind::AdditiveSliding))
             ),
             "the same for additive FTC as printed, best of all runs",
         ),
         key(
-            format!("{} ×", number(record.best_over_told(Contender::NoFtc))),
+            format!("{} ×", number(record.best_over_told(ControllerKind::NoFtc))),
             "the same without FTC, best of all runs",
         ),
         key(
@@ -123,7 +124,7 @@ fn shown(shown: &Shown) -> Section {
 /// Figures 2 and 3: the outputs.
 fn response(shown: &Shown, output: usize) -> Option<Figure> {
     let te = shown.design.controller.plant.sample_time;
-    let run = shown.of(Contender::Proposed)?;
+    let run = shown.of(ControllerKind::Proposed)?;
     let mut figure = figure(
         run,
         &shown.design,
@@ -135,22 +136,24 @@ fn response(shown: &Shown, output: usize) -> Option<Figure> {
         &fault_intervals(run, output),
     );
     for who in [
-        Contender::AdditiveSliding,
-        Contender::ToldTheFault,
-        Contender::Proposed,
+        ControllerKind::AdditiveSliding,
+        ControllerKind::ToldTheFault,
+        ControllerKind::Proposed,
     ] {
         let points = curve(shown.of(who)?, te, |record| record.y_true[output]);
-        figure = figure.with(series(who.name(), who.variant(), points));
+        figure = figure.with(style::variant(who.name(), who.variant(), points));
     }
-    Some(figure.with(reference(curve(run, te, |record| record.reference[output]))))
+    Some(figure.with(style::reference(curve(run, te, |record| {
+        record.reference[output]
+    }))))
 }
 
 /// Figure 4: the fault and its estimates.
 fn estimate(shown: &Shown, sensor: usize) -> Option<Figure> {
     let te = shown.design.controller.plant.sample_time;
-    let run = shown.of(Contender::Proposed)?;
+    let run = shown.of(ControllerKind::Proposed)?;
     let truth = curve(run, te, |record| record.fault[sensor]);
-    let printed = curve(shown.of(Contender::AdditiveSliding)?, te, |record| {
+    let printed = curve(shown.of(ControllerKind::AdditiveSliding)?, te, |record| {
         record.f_hat[sensor]
     });
     let found = curve(run, te, |record| record.f_hat[sensor]);
@@ -166,16 +169,11 @@ fn estimate(shown: &Shown, sensor: usize) -> Option<Figure> {
     );
     Some(
         figure
+            .with(style::true_fault(truth))
             .with(
-                Series::new("true fault", truth)
-                    .ink(Ink::Green)
-                    .weight(Weight::Broad)
-                    .step(),
-            )
-            .with(
-                series(
+                style::variant(
                     "sliding window, printed",
-                    Contender::AdditiveSliding.variant(),
+                    ControllerKind::AdditiveSliding.variant(),
                     printed,
                 )
                 .step(),
@@ -187,7 +185,7 @@ fn estimate(shown: &Shown, sensor: usize) -> Option<Figure> {
 /// Figures 5 and 6: the inputs.
 fn command(shown: &Shown, input: usize) -> Option<Figure> {
     let te = shown.design.controller.plant.sample_time;
-    let run = shown.of(Contender::Proposed)?;
+    let run = shown.of(ControllerKind::Proposed)?;
     let mut figure = figure(
         run,
         &shown.design,
@@ -198,9 +196,9 @@ fn command(shown: &Shown, input: usize) -> Option<Figure> {
         ),
         &any_fault_intervals(run),
     );
-    for who in [Contender::ToldTheFault, Contender::Proposed] {
+    for who in [ControllerKind::ToldTheFault, ControllerKind::Proposed] {
         let points = curve(shown.of(who)?, te, |record| record.u[input]);
-        figure = figure.with(series(who.name(), who.variant(), points).step());
+        figure = figure.with(style::variant(who.name(), who.variant(), points).step());
     }
     Some(figure)
 }
@@ -261,14 +259,14 @@ fn runs(record: &Record) -> Section {
 fn table(record: &Record, channel: &str, noise: f64) -> Table {
     let mut rows = Vec::new();
     for reference in REFERENCES {
-        let group: Vec<&Run> = Contender::ALL
+        let group: Vec<&Run> = ControllerKind::ALL
             .into_iter()
-            .filter_map(|contender| record.run(channel, reference, noise, contender))
+            .filter_map(|controller| record.run(channel, reference, noise, controller))
             .collect();
         for (place, run) in group.iter().enumerate() {
             rows.push(Row {
                 cells: cells(run, place == 0),
-                emphasised: run.controller == Contender::Proposed,
+                emphasised: run.controller == ControllerKind::Proposed,
                 begins_group: place == 0 && !rows.is_empty(),
             });
         }
@@ -321,10 +319,10 @@ fn bound(run: &Run) -> Row {
     }
 }
 
-fn contenders() -> Table {
-    let rows = Contender::ALL.map(|contender| Row {
-        cells: vec![contender.name().into(), contender.explanation().into()],
-        emphasised: contender == Contender::Proposed,
+fn controllers() -> Table {
+    let rows = ControllerKind::ALL.map(|controller| Row {
+        cells: vec![controller.name().into(), controller.explanation().into()],
+        emphasised: controller == ControllerKind::Proposed,
         ..Row::default()
     });
     Table {

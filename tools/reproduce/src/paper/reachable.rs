@@ -1,6 +1,6 @@
 //! Which references reach the paper's MSE and VAF, which cannot, and why.
 
-use super::{Contender, OutputMerits};
+use super::{ControllerKind, OutputMerits};
 use ftc_simulate::Trajectory;
 use ftc_simulate::metrics::{Merit, merit, variance};
 use serde::Serialize;
@@ -41,14 +41,14 @@ impl Reference {
     pub fn new(
         name: &'static str,
         signals: &[Vec<f64>],
-        found: &[(Contender, Vec<OutputMerits>)],
+        found: &[(ControllerKind, Vec<OutputMerits>)],
     ) -> Self {
         let nothing = Merit {
             mse: f64::NAN,
             vaf: f64::NAN,
         };
-        let of = |who: Contender| {
-            let mut all = found.iter().filter(|(contender, _)| *contender == who);
+        let of = |who: ControllerKind| {
+            let mut all = found.iter().filter(|(controller, _)| *controller == who);
             let merits = all.next().and_then(|(_, merits)| merits.first());
             merits.map_or(nothing, |merits| merits.truth)
         };
@@ -61,8 +61,8 @@ impl Reference {
             name,
             variance: variance(reference),
             deadbeat: merit(&late, reference),
-            told: of(Contender::ToldTheFault),
-            proposed: of(Contender::Proposed),
+            told: of(ControllerKind::ToldTheFault),
+            proposed: of(ControllerKind::Proposed),
         }
     }
 

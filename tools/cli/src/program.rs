@@ -17,18 +17,19 @@ mod progress;
 mod solved;
 
 use clap::{Parser, Subcommand, ValueEnum};
-use design_file::schema::DesignFile;
+use design_file::Loaded;
 use failure::Failure;
 use ftc_design::assembly::Request;
+use ftc_design::warnings::LoggedMovement;
 use ftc_design::{Design, DesignError, Run, Solver, Step};
 use package::output::Staging;
 use progress::Progress;
 use report::{summary, warnings};
 use serde_json::json;
+use std::ffi::OsString;
 use std::fmt::Write as _;
 use std::io::Write;
 use std::path::{Path, PathBuf};
-use std::process::ExitCode;
 
 /// Design, certify, export and simulate sensor-fault-tolerant controllers for switched linear plants.
 ///
@@ -166,6 +167,13 @@ impl From<SolverChoice> for Solver {
     }
 }
 
+/// Exit code: done.
+const DONE: u8 = 0;
+/// Exit code: no such controller, or a promise that does not hold.
+const NO_SUCH: u8 = 1;
+/// Exit code: the command line, a file or an output is at fault.
+const INPUT: u8 = 2;
+
 /// What can be reproduced.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 enum Experiment {
@@ -175,11 +183,24 @@ enum Experiment {
     Converter,
 }
 
-fn main() -> ExitCode {
-    let arguments = Arguments::parse();
-    match run(&arguments) {
-        Ok(_) if arguments.quiet => ExitCode::SUCCESS,
-        Ok(text) => print(&text).map_or_else(unprinted, |()| ExitCode::SUCCESS),
+/// Runs the program with its arguments (the first is its name) and returns its exit code.
+///
+/// FMU binaries are sought in `binaries`, by default beside the running program.
+pub fn main(arguments: Vec<OsString>, binaries: Option<PathBuf>) -> u8 {
+    let arguments = match Arguments::try_parse_from(arguments) {
+        Ok(arguments) => arguments,
+        Err(error) => {
+            // Help and version are no errors; to whom they go, clap knows.
+            let printed = error.print();
+            return match (error.exit_code(), printed) {
+                (0, Err(error)) => unprinted(error),
+                (code, _) => u8::try_from(code).unwrap_or(INPUT),
+            };
+        }
+    };
+    match run(&arguments, binaries) {
+        Ok(_) if arguments.quiet => DONE,
+        Ok(text) => print(&text).map_or_else(unprinted, |()| DONE),
         Err(failure) => {
             let printed = failure.output().map_or(Ok(()), print);
             eprintln!("error: {failure}");
@@ -189,7 +210,7 @@ fn main() -> ExitCode {
 }
 
 /// Runs the command and returns what to print.
-fn run(arguments: &Arguments) -> Result<String, Failure> {
+fn run(arguments: &Arguments, binaries: Option<PathBuf>) -> Result<String, Failure> {
     let progress = Progress::new(arguments.quiet);
     let asked = |solved, save| How {
         solver: arguments.solver.into(),
@@ -203,7 +224,7 @@ fn run(arguments: &Arguments) -> Result<String, Failure> {
             as_printed: true,
             ..
         } => {
-            let (_, request) = read(design, &progress)?;
+            let request = read(design, &progress)?.request;
             progress.tell("looking for a margin");
             as_printed::report(design, request, *json)
         }
@@ -227,7 +248,7 @@ fn run(arguments: &Arguments) -> Result<String, Failure> {
         } => {
             check_output(out)?;
             let made = solve(design, &asked(solved.as_deref(), None), &progress)?;
-            export(&made, out, *ssp)
+            export(&made, out, *ssp, binaries)
         }
         Command::Simulate {
             design,
@@ -262,11 +283,17 @@ fn verify(fmu: &Path, as_json: bool) -> Result<String, Failure> {
 }
 
 /// Writes both FMUs and says for which platforms.
-fn export(made: &Made, out: &Path, ssp: bool) -> Result<String, Failure> {
+fn export(
+    made: &Made,
+    out: &Path,
+    ssp: bool,
+    binaries: Option<PathBuf>,
+) -> Result<String, Failure> {
     let options = package::Options {
         out: out.to_path_buf(),
-        binaries: beside_program()?,
+        binaries: binaries.map_or_else(beside_program, Ok)?,
         ssp,
+        platforms: None,
     };
     let exported = package::export(&made.design, &options)?;
     let mut text = String::new();
@@ -352,13 +379,9 @@ fn write(out: &Path, files: &[(String, Vec<u8>)]) -> Result<(), Failure> {
 }
 
 /// Reads a design file.
-fn read(path: &Path, progress: &Progress) -> Result<(DesignFile, Request), Failure> {
+fn read(path: &Path, progress: &Progress) -> Result<Loaded, Failure> {
     progress.tell("reading the design file");
-    let file = design_file::read(path).map_err(Failure::Input)?;
-    let folder = path.parent().unwrap_or(Path::new(""));
-    design_file::assemble::request(&file, folder)
-        .map_err(|what| Failure::Input(format!("{}: {what}", path.display())))
-        .map(|request| (file, request))
+    design_file::read(path).map_err(|error| Failure::Input(error.to_string()))
 }
 
 /// A design, and what its user should know of it: one sentence each.
@@ -378,9 +401,9 @@ struct How<'a> {
 
 /// Reads a design file and makes the design, or takes it from where it was kept.
 fn solve(path: &Path, how: &How, progress: &Progress) -> Result<Made, Failure> {
-    let (file, request) = read(path, progress)?;
+    let Loaded { file, request, .. } = read(path, progress)?;
     let asked = request.control.clone();
-    let logged = warnings::Logged::of(&request.estimator.database);
+    let logged = LoggedMovement::of(&request.estimator.database);
     let key = solved::key(&request, how.solver);
     let design = match how.solved {
         Some(file) => {
@@ -428,7 +451,7 @@ fn print(text: &str) -> std::io::Result<()> {
 }
 
 /// What the reader of standard output asked for is lost.
-fn unprinted(error: std::io::Error) -> ExitCode {
+fn unprinted(error: std::io::Error) -> u8 {
     eprintln!("error: standard output cannot be written to ({error}): send it elsewhere");
-    ExitCode::from(2)
+    INPUT
 }

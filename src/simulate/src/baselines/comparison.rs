@@ -1,29 +1,46 @@
-//! `simulate --baselines`: what the design is compared with, in the same scenario.
+//! The baselines of one design, in the scenario of that design.
 
+use super::predictive::{Predictive, PredictiveSpec};
+use super::{additive, deadbeat_bound, response_delay};
+use crate::{PlantSimulator, Trajectory, Variant, run, run_with};
 use ftc_control::Controller;
 use ftc_design::{Design, DesignError};
-use ftc_simulate::baselines::predictive::{Predictive, PredictiveSpec};
-use ftc_simulate::baselines::{additive, deadbeat_bound, response_delay};
-use ftc_simulate::{PlantSimulator, Trajectory, Variant, run, run_with};
 
 /// Samples the predictive controller looks ahead.
 const HORIZON: usize = 20;
 /// Least noise its filter assumes, relative to the nominal value of an output.
 const LEAST_NOISE: f64 = 1e-3;
 
+/// Why a design cannot be compared with a baseline.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum BaselineError {
+    /// There are no gains for the additive control.
+    #[error("the additive baseline: {0}")]
+    Additive(#[from] DesignError),
+    /// There is no predictive controller.
+    #[error("the predictive baseline: {0}")]
+    Predictive(String),
+    /// The design was not synthesised, so its weights are unknown.
+    #[error("the design carries no weights: design it again")]
+    NoWeights,
+}
+
 /// The additive FTC of the paper's section III and model predictive control.
 ///
 /// # Errors
-/// One sentence where one of them cannot be designed for this plant.
-pub fn trajectories(design: &Design, plant: &PlantSimulator) -> Result<Vec<Trajectory>, String> {
-    let parameters =
-        additive(design).map_err(|error: DesignError| format!("the additive baseline: {error}"))?;
+/// Where one of them cannot be designed for this plant.
+pub fn trajectories(
+    design: &Design,
+    plant: &PlantSimulator,
+) -> Result<Vec<Trajectory>, BaselineError> {
+    let parameters = additive(design)?;
     let printed = run(plant, &Controller::new(parameters), Variant::Additive);
     let delayed = design.controller.feedback.latency > 0;
     let spec = predictive(design, &printed)?;
     let mode = plant.initial_state().mode;
     let mut controller = Predictive::new(&design.controller.plant, &spec, mode)
-        .map_err(|what| format!("the predictive baseline: {what}"))?;
+        .map_err(|error| BaselineError::Predictive(error.to_string()))?;
     if delayed {
         controller = controller.one_sample_late();
     }
@@ -33,11 +50,11 @@ pub fn trajectories(design: &Design, plant: &PlantSimulator) -> Result<Vec<Traje
 
 /// The predictive controller with the design's weights and limits. Its filter is told the noise
 /// and the mean power of the disturbance that the scenario plays.
-fn predictive(design: &Design, played: &Trajectory) -> Result<PredictiveSpec, String> {
+fn predictive(design: &Design, played: &Trajectory) -> Result<PredictiveSpec, BaselineError> {
     let asked = &design
         .synthesis
         .as_ref()
-        .ok_or("the design carries no weights: design it again")?
+        .ok_or(BaselineError::NoWeights)?
         .state_feedback
         .spec;
     let outputs = design.signals.outputs.iter();

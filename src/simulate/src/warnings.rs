@@ -1,0 +1,154 @@
+//! What a user should know of a run that went through: values, to be put into words by who shows them.
+
+use crate::closed_loop::Record;
+use crate::{Trajectory, Variant};
+use ftc_control::estimator::InputHistory;
+use ftc_control::parameters::{Estimator, EstimatorMethod};
+use ftc_design::Design;
+use ftc_plant::Truth;
+
+/// Share of the samples of a run that may lie outside the database without a warning.
+const SHARE_OUTSIDE: f64 = 0.05;
+/// Share of the samples of a run that may be spent waiting after mode switches without a warning.
+const SHARE_UNJUDGED: f64 = 0.25;
+
+/// What limits the conclusions from one run.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
+pub enum RunWarning {
+    /// In this share of the samples no sensor was judged, since a mode had just been entered.
+    Unjudged {
+        /// Share of the samples, 0 to 1.
+        share: f64,
+        /// Response length `j` in samples.
+        response_length: usize,
+    },
+    /// In this share of the samples the inputs lay outside what the healthy database spans.
+    OutsideTheDatabase {
+        /// Share of the samples, 0 to 1.
+        share: f64,
+        /// How many times thresholds were widened at most.
+        widening: f64,
+    },
+    /// The plant's equations could not be integrated further.
+    Stopped {
+        /// The run.
+        variant: Variant,
+        /// When, in seconds.
+        time: f64,
+    },
+    /// The DC link of a rectifier fell to the voltage at which its diodes conduct.
+    DiodesConduct {
+        /// The run.
+        variant: Variant,
+        /// That voltage in V.
+        voltage: f64,
+        /// When first, in seconds.
+        time: f64,
+        /// In which share of the samples, 0 to 1.
+        share: f64,
+    },
+}
+
+/// All warnings of the runs of a design.
+pub fn of_runs(design: &Design, runs: &[Trajectory]) -> Vec<RunWarning> {
+    let ftc = runs.iter().find(|run| run.variant == Variant::Ftc);
+    let unjudged = ftc.into_iter().flat_map(|run| unjudged(design, run));
+    let stopped = runs.iter().filter_map(|run| stopped(design, run));
+    let diodes = runs.iter().filter_map(|run| diodes_conduct(design, run));
+    unjudged.chain(stopped).chain(diodes).collect()
+}
+
+/// How much of a run the estimator could not judge, and why.
+fn unjudged(design: &Design, run: &Trajectory) -> Vec<RunWarning> {
+    let estimator = &design.controller.estimator;
+    let samples = run.records.len();
+    let share = |count: usize| count as f64 / samples.max(1) as f64;
+    let held = share(held(estimator, &run.records));
+    let outside = OutsideDatabase::of(design, run);
+    let mut warnings = Vec::new();
+    if estimator.method != EstimatorMethod::None && held > SHARE_UNJUDGED {
+        warnings.push(RunWarning::Unjudged {
+            share: held,
+            response_length: estimator.response_length,
+        });
+    }
+    if share(outside.samples) > SHARE_OUTSIDE {
+        warnings.push(RunWarning::OutsideTheDatabase {
+            share: share(outside.samples),
+            widening: outside.widening,
+        });
+    }
+    warnings
+}
+
+/// Samples after the start or a switch in which the regressor does not hold one mode only.
+fn held(estimator: &Estimator, records: &[Record]) -> usize {
+    let visits = records.chunk_by(|one, next| one.mode == next.mode);
+    visits
+        .map(|visit| visit.len().min(estimator.response_length))
+        .sum()
+}
+
+/// What of a run lay outside the healthy database.
+struct OutsideDatabase {
+    /// How many samples.
+    samples: usize,
+    /// The most by which it opened thresholds.
+    widening: f64,
+}
+
+impl OutsideDatabase {
+    /// Plays the inputs of a run once more.
+    fn of(design: &Design, run: &Trajectory) -> Self {
+        let controller = &design.controller;
+        let (estimator, modes) = (&controller.estimator, &controller.plant.modes);
+        let mut outside = Self {
+            samples: 0,
+            widening: 1.0,
+        };
+        let Some(first) = run.records.first() else {
+            return outside;
+        };
+        let start = &modes[first.mode].operating_point.u;
+        let mut history = InputHistory::new(start, estimator.response_length);
+        let mut before = start;
+        for record in &run.records {
+            if let Some(predictor) = estimator.predictors.get(record.mode) {
+                history.regress(&modes[record.mode].operating_point.u);
+                let leverage = history.leverage(&predictor.factor);
+                outside.samples += usize::from(leverage > estimator.leverage_limit);
+                outside.widening = outside.widening.max((1.0 + leverage).sqrt());
+            }
+            let delayed = controller.feedback.latency > 0;
+            history.push(if delayed { before } else { &record.u });
+            before = &record.u;
+        }
+        outside
+    }
+}
+
+/// A run that ended in equations without a solution.
+fn stopped(design: &Design, run: &Trajectory) -> Option<RunWarning> {
+    Some(RunWarning::Stopped {
+        variant: run.variant,
+        time: run.stalled? as f64 * design.controller.plant.sample_time,
+    })
+}
+
+/// A rectifier that left the region in which it is the plant of the design.
+fn diodes_conduct(design: &Design, run: &Trajectory) -> Option<RunWarning> {
+    let Truth::Rectifier(rectifier) = &design.truth else {
+        return None;
+    };
+    let voltage = rectifier.diode_voltage();
+    let below = |record: &&Record| record.x[2] < voltage;
+    let first = run.records.iter().find(below)?;
+    let count = run.records.iter().filter(below).count();
+    Some(RunWarning::DiodesConduct {
+        variant: run.variant,
+        voltage,
+        time: first.tick as f64 * design.controller.plant.sample_time,
+        share: count as f64 / run.records.len() as f64,
+    })
+}

@@ -1,0 +1,45 @@
+//! Healthy sensors are not accused: random plants under noise, disturbance and mode switches, with
+//! thresholds at 6 standard deviations of the residual.
+//!
+//! promise: no-false-alarms
+
+mod random_plants;
+
+use ftc_control::Controller;
+use ftc_plant::scenario::ModeInterval;
+use ftc_simulate::{PlantSimulator, Variant, run};
+use random_plants::{Dice, STEPS, design};
+
+/// Plants; each runs for [`STEPS`] samples. `cargo bench --bench detection` counts on twenty.
+const PLANTS: usize = 4;
+/// Samples between two mode switches.
+const EVERY: u64 = 5_000;
+
+#[test]
+fn no_healthy_sensor_is_accused() {
+    let mut dice = Dice::seeded(71);
+    let mut samples = 0;
+    for plant in 0..PLANTS {
+        let mut design = design(&mut dice);
+        let te = design.controller.plant.sample_time;
+        design.scenario.schedule = (0..STEPS / EVERY)
+            .map(|k| ModeInterval {
+                from: (k * EVERY) as f64 * te,
+                mode: (k % 2) as usize,
+            })
+            .collect();
+        let simulator = PlantSimulator::new(design.controller.plant.clone(), design.scenario);
+        let controller = Controller::new(design.controller);
+        let trajectory = run(&simulator, &controller, Variant::Ftc);
+        for record in &trajectory.records {
+            assert!(
+                !record.flagged.contains(&true),
+                "plant {plant}, sample {}: {:?}",
+                record.tick,
+                record.residual
+            );
+        }
+        samples += trajectory.records.len() as u64;
+    }
+    assert_eq!(samples, PLANTS as u64 * STEPS);
+}

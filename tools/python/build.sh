@@ -1,0 +1,20 @@
+#!/usr/bin/env bash
+# Builds the wheel into dist/: the Python package, the command line, and FMU binaries of the named
+# platforms, which must have been built into target/release/fmu-binaries:
+#
+#     tools/python/build.sh linux64 win64 aarch64-linux
+#
+# For another machine than this one: TARGET=aarch64-unknown-linux-gnu. Needs maturin and ziglang
+# (requirements.txt) on the path.
+set -euo pipefail
+cd "$(dirname "$0")/../.."
+
+package=tools/python/ftc_fmu
+rm -rf "$package/fmu-binaries"
+for platform in "$@"; do
+    mkdir -p "$package/fmu-binaries/$platform"
+    cp target/release/fmu-binaries/"$platform"/* "$package/fmu-binaries/$platform/"
+done
+maturin build --release --zig --compatibility manylinux2014 --manifest-path tools/python/Cargo.toml \
+    ${TARGET:+--target "$TARGET"} --out dist
+echo "the wheel holds FMU binaries for: $*"

@@ -1,0 +1,70 @@
+"""Sensor-fault-tolerant control of switched plants: design, proof, FMUs, simulation.
+
+import ftc_fmu as ftc
+
+plant = ftc.Plant([sys1, sys2], sample_time=5.0, disturbance_inputs=[2])
+design = ftc.design(plant, name="tank", tracked=["level 1", "level 2"], decay=0.97)
+run = design.simulate()
+design.export("out")
+"""
+
+from __future__ import annotations
+
+import json
+from typing import TYPE_CHECKING, Any
+
+from ftc_fmu import _core
+from ftc_fmu._place import HOME
+from ftc_fmu.controller import Controller
+from ftc_fmu.design import Design, design, load
+from ftc_fmu.errors import DesignFileError, FtcError, Infeasible, MissingExtra, NoDesign, Uncertified, Unproved
+from ftc_fmu.identification import Identification
+from ftc_fmu.log import Log
+from ftc_fmu.plant import Mode, OperatingPoint, Plant
+from ftc_fmu.run import Run
+
+if TYPE_CHECKING:
+    from os import PathLike
+
+__version__ = _core.version()
+
+
+def verify(path: str | PathLike[str]) -> dict[str, Any]:
+    """Proves again, from the numbers in an FMU alone, what it promises; nothing is solved.
+
+    Returns:
+        What is proved: stability under which switching, decay, gamma per mode, platforms.
+
+    Raises:
+        Unproved: A promise does not hold, or the FMU's parts do not belong together.
+        FtcError: The file is no FMU of this package, or damaged.
+    """
+    return json.loads(_core.verify(str(path)))
+
+
+def platforms() -> list[str]:
+    """Returns the platforms for which this installation holds FMU binaries, by their FMI 2.0 names."""
+    return _core.platforms(HOME)
+
+
+__all__ = [
+    "Controller",
+    "Design",
+    "DesignFileError",
+    "FtcError",
+    "Identification",
+    "Infeasible",
+    "Log",
+    "MissingExtra",
+    "Mode",
+    "NoDesign",
+    "OperatingPoint",
+    "Plant",
+    "Run",
+    "Uncertified",
+    "Unproved",
+    "design",
+    "load",
+    "platforms",
+    "verify",
+]

@@ -1,0 +1,160 @@
+//! Designs: solved, read again, simulated, exported.
+
+use crate::controller::Controller;
+use crate::errors::{self, Author};
+use crate::run::Run;
+use crate::waiting::wait;
+use ftc_design::DesignError;
+use ftc_design::assembly::{Request, assemble};
+use ftc_design::warnings::LoggedMovement;
+use pyo3::exceptions::PyValueError;
+use pyo3::prelude::*;
+use pyo3::types::PyBytes;
+use report::{summary, warnings};
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+/// A design and what its user should know of it.
+struct Made {
+    design: ftc_design::Design,
+    warnings: Vec<String>,
+}
+
+/// A finished design.
+#[pyclass(frozen, module = "ftc_fmu._core")]
+pub struct Design(Arc<Made>);
+
+/// The text of a design file.
+#[pyfunction]
+pub fn read_text(py: Python<'_>, path: PathBuf) -> PyResult<String> {
+    let called = path.display().to_string();
+    design_file::load(&path).map_err(|what| {
+        errors::of_input(py, design_file::Error::of_file(what), Author::User(&called))
+    })
+}
+
+/// Designs what a text asks for; logs and tables are sought in `folder`. `called` is the name of
+/// the file that the user wrote, if there is one.
+#[pyfunction]
+#[pyo3(signature = (text, folder, called=None, listener=None))]
+pub fn solve(
+    py: Python<'_>,
+    text: &str,
+    folder: PathBuf,
+    called: Option<&str>,
+    listener: Option<Py<PyAny>>,
+) -> PyResult<Design> {
+    let author = called.map_or(Author::Package, Author::User);
+    let loaded =
+        design_file::parse(text, &folder).map_err(|error| errors::of_input(py, error, author))?;
+    let what = "solving for gains and certifying them";
+    let made = wait(py, what, listener.as_ref(), move || {
+        let logged = LoggedMovement::of(&loaded.request.estimator.database);
+        let design = assemble(loaded.request)?;
+        let warnings = warnings::of_design(&loaded.file, logged.as_ref(), &design);
+        Ok::<_, DesignError>(Made { design, warnings })
+    })?;
+    made.map(|made| Design(Arc::new(made)))
+        .map_err(|error| errors::of_design(py, &error, text, author))
+}
+
+/// A design from its record.
+#[pyfunction]
+pub fn restore(record: &[u8]) -> PyResult<Design> {
+    let (design, warnings) = serde_json::from_slice(record)
+        .map_err(|error| PyValueError::new_err(format!("no record of a design: {error}")))?;
+    Ok(Design(Arc::new(Made { design, warnings })))
+}
+
+#[pymethods]
+impl Design {
+    /// The report as JSON.
+    fn json(&self) -> String {
+        summary::json(&self.0.design, &self.0.warnings)
+    }
+
+    /// The report as text.
+    fn text(&self) -> String {
+        summary::text(&self.0.design, &self.0.warnings)
+    }
+
+    /// The page that the FMU carries, with the figures of its scenario.
+    fn html(&self, py: Python<'_>) -> PyResult<String> {
+        let made = self.0.clone();
+        wait(py, "simulating", None, move || {
+            let runs = report::documentation::runs(&made.design);
+            let lead = "Sensor-fault-tolerant controller of a switched plant.".into();
+            report::documentation::page(&made.design, &runs, made.design.name.clone(), lead)
+        })
+    }
+
+    /// What is worth knowing.
+    fn warnings(&self) -> Vec<String> {
+        self.0.warnings.clone()
+    }
+
+    /// Everything, for [`restore`].
+    fn record<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyBytes>> {
+        let record = (&self.0.design, &self.0.warnings);
+        let bytes = serde_json::to_vec(&record)
+            .map_err(|error| PyValueError::new_err(error.to_string()))?;
+        Ok(PyBytes::new(py, &bytes))
+    }
+
+    /// Runs the loop; a design file's text may bring another scenario.
+    #[pyo3(signature = (text, folder, baselines=false))]
+    fn simulate(
+        &self,
+        py: Python<'_>,
+        text: Option<&str>,
+        folder: PathBuf,
+        baselines: bool,
+    ) -> PyResult<Run> {
+        let mut design = self.0.design.clone();
+        if let Some(text) = text {
+            let request = requested(py, text, &folder)?;
+            design.scenario = request.scenario;
+            design.truth = request.truth;
+        }
+        let made = self.0.clone();
+        let simulated = wait(py, "simulating", None, move || {
+            Run::of(&design, made.warnings.clone(), baselines)
+        })?;
+        simulated.map_err(|what| errors::of_sentence(py, what))
+    }
+
+    /// Writes the FMUs; returns the paths.
+    fn export(
+        &self,
+        py: Python<'_>,
+        out: PathBuf,
+        binaries: PathBuf,
+        ssp: bool,
+        platforms: Option<Vec<String>>,
+    ) -> PyResult<Vec<PathBuf>> {
+        let made = self.0.clone();
+        let options = package::Options {
+            out,
+            binaries,
+            ssp,
+            platforms,
+        };
+        let written = wait(py, "exporting", None, move || {
+            package::export(&made.design, &options)
+        })?;
+        written
+            .map(|exported| exported.paths)
+            .map_err(|error| errors::of_package(py, error))
+    }
+
+    /// The controller at rest.
+    fn controller(&self) -> PyResult<Controller> {
+        Controller::of(&self.0.design)
+    }
+}
+
+fn requested(py: Python<'_>, text: &str, folder: &Path) -> PyResult<Request> {
+    design_file::parse(text, folder)
+        .map(|loaded| loaded.request)
+        .map_err(|error| errors::of_input(py, error, Author::Package))
+}

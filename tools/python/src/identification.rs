@@ -1,0 +1,115 @@
+//! Identification from logs, and discretisation.
+
+use crate::errors;
+use crate::waiting::wait;
+use ftc_identify::{Coordinates, Identified, IdentifiedMode, Log, Settings};
+use nalgebra::{DMatrix, DVector};
+use pyo3::exceptions::PyValueError;
+use pyo3::prelude::*;
+
+type Rows = Vec<Vec<f64>>;
+
+fn matrix(rows: &Rows) -> PyResult<DMatrix<f64>> {
+    let columns = rows.first().map_or(0, Vec::len);
+    if rows.iter().any(|row| row.len() != columns) {
+        return Err(PyValueError::new_err("rows differ in length"));
+    }
+    Ok(DMatrix::from_fn(rows.len(), columns, |row, column| {
+        rows[row][column]
+    }))
+}
+
+fn rows(matrix: &DMatrix<f64>) -> Rows {
+    matrix
+        .row_iter()
+        .map(|row| row.iter().copied().collect())
+        .collect()
+}
+
+fn list(values: &DVector<f64>) -> Vec<f64> {
+    values.iter().copied().collect()
+}
+
+/// `A` (n x n) and `B` (n x m) at a sample time, exact for inputs that are held between samples.
+#[pyfunction]
+pub fn discretise(a: Rows, b: Rows, sample_time: f64) -> PyResult<(Rows, Rows)> {
+    let (a, b) = (matrix(&a)?, matrix(&b)?);
+    let (n, m) = (a.nrows(), b.ncols());
+    let mut both = DMatrix::zeros(n + m, n + m);
+    both.view_mut((0, 0), (n, n)).copy_from(&(a * sample_time));
+    both.view_mut((0, n), (n, m)).copy_from(&(b * sample_time));
+    let exact = both.exp();
+    if !exact.iter().all(|value| value.is_finite()) {
+        let what =
+            "the model grows beyond all numbers within one sample: give a shorter sample time";
+        return Err(PyValueError::new_err(what));
+    }
+    let part = |column, width| rows(&exact.view((0, column), (n, width)).into_owned());
+    Ok((part(0, n), part(n, m)))
+}
+
+/// Matrices A, B, C, then x0, u0, y0, then the fit per output, samples held out and used.
+type Found = (Rows, Rows, Rows, [Vec<f64>; 3], Vec<f64>, usize, usize);
+/// Order, orders tried with their fits, modes, how states were joined and the fit of that.
+type Answer = (
+    usize,
+    Vec<(usize, f64)>,
+    Vec<Found>,
+    &'static str,
+    Option<f64>,
+);
+
+/// Models of the modes from logs: per log inputs, outputs (rows of samples) and modes (from 1).
+#[pyfunction]
+pub fn identify(
+    py: Python<'_>,
+    logs: Vec<(Rows, Rows, Vec<usize>)>,
+    order: Option<usize>,
+) -> PyResult<Answer> {
+    let logs: Vec<Log> = logs
+        .into_iter()
+        .map(|(inputs, outputs, modes)| {
+            let modes = modes
+                .iter()
+                .map(|mode| mode.checked_sub(1))
+                .collect::<Option<Vec<_>>>();
+            Ok(Log {
+                inputs: matrix(&inputs)?,
+                outputs: matrix(&outputs)?,
+                modes: modes.ok_or_else(|| PyValueError::new_err("modes are numbered from 1"))?,
+            })
+        })
+        .collect::<PyResult<_>>()?;
+    let settings = Settings {
+        order,
+        ..Settings::default()
+    };
+    let found = wait(py, "identifying", None, move || {
+        ftc_identify::identify(&logs, &settings)
+    })?;
+    found
+        .map(answer)
+        .map_err(|error| errors::of_sentence(py, error))
+}
+
+fn answer(found: Identified) -> Answer {
+    let (joined, fit) = match found.coordinates {
+        Coordinates::Single => ("single mode", None),
+        Coordinates::Switches { fit } => ("switches", Some(fit)),
+        Coordinates::Outputs => ("outputs", None),
+    };
+    let one = |mode: IdentifiedMode| {
+        let point = [list(&mode.x0), list(&mode.u0), list(&mode.y0)];
+        (
+            rows(&mode.a),
+            rows(&mode.b),
+            rows(&mode.c),
+            point,
+            mode.fit,
+            mode.held_out,
+            mode.samples,
+        )
+    };
+    let modes = found.modes.into_iter().map(one).collect();
+    (found.order, found.tried, modes, joined, fit)
+}

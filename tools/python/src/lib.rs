@@ -1,0 +1,67 @@
+//! The compiled half of the Python package `ftc_fmu`.
+//!
+//! Python builds the text of a design file, and everything from there on is what the command line
+//! does: the same reader, the same refusals, the same bits. Only plain values cross over: texts,
+//! lists of numbers, bytes of doubles. Documentation for users is in the Python sources and stubs.
+
+mod controller;
+mod design;
+mod errors;
+mod identification;
+mod run;
+mod waiting;
+
+use pyo3::prelude::*;
+use std::ffi::OsString;
+use std::path::{Path, PathBuf};
+
+#[pymodule]
+mod _core {
+    #[pymodule_export]
+    use super::controller::Controller;
+    #[pymodule_export]
+    use super::design::{Design, read_text, restore, solve};
+    #[pymodule_export]
+    use super::identification::{discretise, identify};
+    #[pymodule_export]
+    use super::run::Run;
+    #[pymodule_export]
+    use super::{main, platforms, verify, version};
+}
+
+/// The command line; returns its exit code.
+#[pyfunction]
+fn main(py: Python<'_>, arguments: Vec<OsString>, binaries: PathBuf) -> u8 {
+    py.detach(|| ftc_fmu::main(arguments, Some(binaries)))
+}
+
+/// Proves an FMU again; returns the proof as JSON.
+#[pyfunction]
+fn verify(py: Python<'_>, path: PathBuf) -> PyResult<String> {
+    let proved = py.detach(|| package::verify(&path));
+    proved
+        .map(|verification| report::summary::pretty(&verification.json()))
+        .map_err(|error| errors::of_package(py, error))
+}
+
+/// Platforms whose FMU binaries are in a folder.
+#[pyfunction]
+fn platforms(binaries: PathBuf) -> Vec<&'static str> {
+    let holds = |platform: &package::platform::Platform| {
+        let folder = binaries.join("fmu-binaries").join(platform.name);
+        let library = |name: &str| folder.join(format!("{name}.{}", platform.extension));
+        ["ftc_controller", "ftc_plant"]
+            .iter()
+            .all(|name| Path::is_file(&library(name)))
+    };
+    let all = package::platform::PLATFORMS.iter();
+    all.filter(|platform| holds(platform))
+        .map(|platform| platform.name)
+        .collect()
+}
+
+/// Version of the package.
+#[pyfunction]
+fn version() -> &'static str {
+    env!("CARGO_PKG_VERSION")
+}

@@ -1,0 +1,206 @@
+"""Designs: the same as the command line's, with errors that have parts."""
+
+from __future__ import annotations
+
+import json
+import pickle
+import signal
+import subprocess
+import sys
+import threading
+import time
+from typing import TYPE_CHECKING
+
+import numpy as np
+import pytest
+
+import ftc_fmu as ftc
+from conftest import EXAMPLES
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+
+def program(*arguments: object) -> subprocess.CompletedProcess:
+    """Runs the command line that the package brings along."""
+    command = [sys.executable, "-m", "ftc_fmu", *map(str, arguments)]
+    return subprocess.run(command, capture_output=True, text=True, check=False)
+
+
+@pytest.fixture(scope="module")
+def tank(tanks: ftc.Plant) -> ftc.Design:
+    """A design from continuous models."""
+    return ftc.design(
+        tanks,
+        name="tank",
+        tracked=["level 1", "level 2"],
+        decay=0.97,
+        disturbance={"period": 600.0, "amplitude": 0.5},
+        scenario={"steps": 300, "noise": 0.02, "seed": 3},
+    )
+
+
+def test_the_program_makes_the_same_design(paper: ftc.Design) -> None:
+    """To the last digit of its report."""
+    done = program("design", EXAMPLES / "paper.toml", "--json")
+    assert done.returncode == 0, done.stderr
+    assert json.loads(done.stdout) == paper.report
+
+
+def test_a_design_and_its_file_are_inverse(tank: ftc.Design, tmp_path: Path) -> None:
+    """Written and read again, the record is the same to the byte."""
+    again = ftc.load(tank.save(tmp_path / "tank.toml"))
+    assert again.document == tank.document
+    assert again.to_toml() == tank.to_toml()
+    assert again._core.record() == tank._core.record()  # noqa: SLF001
+
+
+def test_examples_are_read_and_written(tmp_path: Path) -> None:
+    """Logs come along."""
+    logged = ftc.load(EXAMPLES / "logged.toml")
+    again = ftc.load(logged.save(tmp_path / "copy" / "logged.toml"))
+    assert again._core.record() == logged._core.record()  # noqa: SLF001
+
+
+def test_a_design_travels(tank: ftc.Design) -> None:
+    """To another process and back, without solving again."""
+    again = pickle.loads(pickle.dumps(tank))  # noqa: S301
+    assert again.report == tank.report
+    assert again._core.record() == tank._core.record()  # noqa: SLF001
+
+
+def test_reports(tank: ftc.Design) -> None:
+    """As text, as one line, and as a page in a notebook."""
+    assert "State feedback" in str(tank)
+    assert "tank" in repr(tank)
+    page = tank._repr_html_()
+    assert page.lower().count("<svg") >= 1
+    assert "tank" in page
+
+
+def test_an_unknown_key_is_named(tanks: ftc.Plant) -> None:
+    """The nearest known one, too; there is no line where there is no file."""
+    with pytest.raises(ftc.DesignFileError, match="tracked") as refused:
+        ftc.design(tanks, trakced=[1])
+    assert refused.value.key == "controller.trakced"
+    assert refused.value.line is None
+    assert str(refused.value).startswith("controller.trakced is not a known key")
+
+
+@pytest.mark.parametrize(
+    ("find", "put", "key"),
+    [
+        ("sample_time = 1.0", "sample_time = -1.0", "sample_time"),
+        ('lyapunov = "common"', 'lyapunov = "comon"', "controller.lyapunov"),
+        ("steps = 1600", "steps = 0", "scenario.steps"),
+        ("B = [[0.0, 1.0], [1.0, 0.0]]", "B = [[0.0, 1.0], [1.0]]", "mode 1: B"),
+    ],
+)
+def test_a_wrong_file_is_told_by_key_and_line(find: str, put: str, key: str, tmp_path: Path) -> None:
+    """The line is that of the key."""
+    text = (EXAMPLES / "paper.toml").read_text()
+    assert find in text
+    path = tmp_path / "wrong.toml"
+    path.write_text(text.replace(find, put, 1))
+    with pytest.raises(ftc.DesignFileError) as refused:
+        ftc.load(path)
+    assert refused.value.key == key
+    assert refused.value.line == 1 + text[: text.index(find)].count("\n")
+    assert str(refused.value).startswith(str(path))
+
+
+def test_a_missing_file_is_said(tmp_path: Path) -> None:
+    """By its name."""
+    with pytest.raises(ftc.DesignFileError, match=r"nothing\.toml"):
+        ftc.load(tmp_path / "nothing.toml")
+
+
+def test_infeasible_has_blocks_and_advice() -> None:
+    """What is in conflict, and what to change."""
+    C = np.eye(2)
+    first = ([[0.6, 0.45], [-0.2, 0.3]], [[0.0, 1.0], [1.0, 0.0]], C)
+    second = ([[0.4, -0.3], [0.11, 0.0]], [[1.0, 0.0], [0.0, 1.0]], C)
+    with pytest.raises(ftc.Infeasible) as refused:
+        ftc.design(ftc.Plant([first, second], 1.0), decay=0.001, latency=1)
+    assert refused.value.blocks
+    assert all(isinstance(name, str) and share >= 0.0 for name, share in refused.value.blocks)
+    assert refused.value.advice
+    assert "line" not in str(refused.value)
+    assert isinstance(refused.value, ftc.FtcError)
+
+
+def test_tracked_outputs_by_name(tanks: ftc.Plant) -> None:
+    """A wrong name is refused with the right ones."""
+    with pytest.raises(ftc.DesignFileError, match="level 1, level 2"):
+        ftc.design(tanks, tracked=["level 3"])
+
+
+SLOW = """
+import sys, numpy as np, ftc_fmu as ftc
+rng = np.random.default_rng(0)
+n = 12
+modes = []
+for _ in range(3):
+    A = rng.normal(size=(n, n)); A *= 0.95 / max(abs(np.linalg.eigvals(A)))
+    modes.append((A, rng.normal(size=(n, n // 2)), rng.normal(size=(n // 2, n)), np.zeros((n // 2, n // 2))))
+plant = ftc.Plant(modes, 1.0)
+"""
+
+
+def test_ctrl_c_ends_the_wait() -> None:
+    """Within a second or two, by KeyboardInterrupt."""
+    code = SLOW + (
+        "def told(what, seconds):\n    print(what, flush=True)\n"
+        "try:\n    ftc.design(plant, decay=0.97, progress=told)\n    print('done')\n"
+        "except KeyboardInterrupt:\n    print('interrupted', flush=True)\n"
+        "    import os; os._exit(0)\n"
+    )
+    process = subprocess.Popen([sys.executable, "-c", code], stdout=subprocess.PIPE, text=True)
+    assert process.stdout is not None
+    assert "solving" in process.stdout.readline()
+    process.send_signal(signal.SIGINT)
+    sent = time.monotonic()
+    rest, _ = process.communicate(timeout=60)
+    assert rest.splitlines()[-1] == "interrupted"
+    assert time.monotonic() - sent < 10.0
+
+
+def test_other_threads_run_on_while_solving() -> None:
+    """The interpreter is released."""
+    code = SLOW + (
+        "import threading, time\nticks = []\nhalt = threading.Event()\n"
+        "def tick():\n    while not halt.is_set():\n        ticks.append(time.monotonic()); time.sleep(0.005)\n"
+        "threading.Thread(target=tick, daemon=True).start()\n"
+        "n = 6\n"
+        "plant = ftc.Plant([(m.A[:n,:n]*0.5, m.B[:n,:3], m.C[:3,:n]) for m in plant.modes[:2]], 1.0)\n"
+        "begun = time.monotonic(); ftc.design(plant, decay=0.97); took = time.monotonic() - begun\n"
+        "halt.set()\n"
+        "during = [t for t in ticks if begun <= t <= begun + took]\n"
+        "print(took, len(during), max(np.diff([begun, *during, begun + took])))\n"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    took, ticks, longest = (float(word) for word in done.stdout.split())
+    assert ticks >= 3
+    assert longest < max(0.5, 0.5 * took)
+
+
+def test_progress_may_be_printed(tanks: ftc.Plant, capsys: pytest.CaptureFixture) -> None:
+    """And a listener that raises ends the wait."""
+    ftc.design(tanks, decay=0.97, progress=True)
+    assert "solving" in capsys.readouterr().out
+
+    def stop(what: str, seconds: float) -> None:
+        raise TimeoutError(f"{what} {seconds}")
+
+    with pytest.raises(TimeoutError):
+        ftc.design(tanks, progress=stop)
+    assert threading.active_count() >= 1
+
+
+def test_the_program_of_the_package() -> None:
+    """Help, a wrong command, and its exit codes."""
+    assert "simulate" in program("--help").stdout
+    refused = program("design", "nothing.toml")
+    assert refused.returncode == 2
+    assert refused.stderr.startswith("error: nothing.toml")
+    assert program("no-such-command").returncode == 2

@@ -1,0 +1,94 @@
+"""Plants from what control engineers hold."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import scipy.signal
+
+import control
+import ftc_fmu as ftc
+
+A = [[-0.3, 1.0], [-0.5, -0.2]]
+B = [[0.0, 0.2], [1.0, 0.1]]
+C = [[1.0, 0.0]]
+D = [[0.0, 0.0]]
+
+
+def matrices(plant: ftc.Plant) -> list[np.ndarray]:
+    """All matrices of the first mode."""
+    mode = plant.modes[0]
+    return [mode.A, mode.B, mode.C, mode.D, mode.E, mode.F]
+
+
+@pytest.mark.parametrize(
+    "system",
+    [
+        control.ss(A, B, C, D),
+        scipy.signal.StateSpace(A, B, C, D),
+        (A, B, C, D, 0),
+        (np.array(A), np.array(B), np.array(C), np.array(D), None),
+    ],
+    ids=["control", "scipy", "arrays", "arrays of scipy"],
+)
+def test_continuous_models_are_discretised_exactly(system: object) -> None:
+    """Every source gives scipy's zero-order hold."""
+    plant = ftc.Plant(system, sample_time=0.5, disturbance_inputs=[1])
+    Ad, Bd, *_ = scipy.signal.cont2discrete((np.array(A), np.array(B), np.array(C), np.array(D)), 0.5)
+    for found, expected in zip(matrices(plant), [Ad, Bd[:, :1], C, [[0.0]], Bd[:, 1:], [[0.0]]], strict=True):
+        np.testing.assert_allclose(found, expected, rtol=1e-13, atol=1e-15)
+
+
+@pytest.mark.parametrize(
+    "system",
+    [
+        control.ss(A, B, C, D, 0.5),
+        control.ss(A, B, C, D, True),  # noqa: FBT003  (python-control's word for an unsaid sample time)
+        scipy.signal.StateSpace(A, B, C, D, dt=0.5),
+        (A, B, C, D, 0.5),
+        (A, B, C),
+    ],
+    ids=["control", "control without a time", "scipy", "arrays", "three arrays"],
+)
+def test_discrete_models_stay_as_they_are(system: object) -> None:
+    """Nothing is done to a model that has the sample time."""
+    for found, expected in zip(matrices(ftc.Plant(system, 0.5))[:3], [A, B, C], strict=True):
+        np.testing.assert_array_equal(found, expected)
+
+
+def test_names_of_the_model_are_kept() -> None:
+    """Labels that a person gave become names, and a disturbance may be named."""
+    system = control.ss(A, B, C, D, inputs=["valve", "wind"], outputs=["speed"], states=["speed", "torque"])
+    plant = ftc.Plant([system, system], 0.5, disturbance_inputs=["wind"])
+    assert plant.signals == {
+        "inputs": [{"name": "valve"}],
+        "outputs": [{"name": "speed"}],
+        "states": [{"name": "speed"}, {"name": "torque"}],
+    }
+    assert plant.modes[1].E.shape == (2, 1)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "key", "says"),
+    [
+        (((A, B, [[1.0]], D), 0.5), "C", "C is 1 x 1: beside the other matrices it must be 1 x 2"),
+        (((A, B, C, D, 0.25), 0.5), "sample_time", "0.25 s"),
+        (((A, B, C, D), -1.0), "sample_time", "positive"),
+        (((A, [[0.0], [np.nan]], C), 0.5), "B", "no finite number"),
+        ((3.0, 0.5), "systems[0]", "type float"),
+    ],
+)
+def test_what_does_not_fit_is_said(arguments: tuple, key: str, says: str) -> None:
+    """One sentence, and the key."""
+    with pytest.raises(ftc.DesignFileError, match=r".") as refused:
+        ftc.Plant(*arguments)
+    assert says in str(refused.value)
+    assert refused.value.key == key
+
+
+def test_disturbances_that_are_not_there_are_refused() -> None:
+    """By number and by name."""
+    with pytest.raises(ftc.DesignFileError, match="column 2, B has columns 0 to 1"):
+        ftc.Plant((A, B, C, D, 0), 0.5, disturbance_inputs=[2])
+    with pytest.raises(ftc.DesignFileError, match='no input "wind"'):
+        ftc.Plant((A, B, C, D, 0), 0.5, disturbance_inputs=["wind"])
