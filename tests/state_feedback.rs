@@ -475,6 +475,8 @@ fn more_tracked_outputs_than_inputs_are_refused_at_once() {
 }
 
 /// Units spread over twelve decades change neither the verdict nor gamma: the whole is in the bench.
+///
+/// promise: any-units
 #[test]
 fn units_change_neither_verdict_nor_gamma() {
     let mut designed = 0;

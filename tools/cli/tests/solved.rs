@@ -1,4 +1,6 @@
 //! A design that was solved is not solved again, and never used where it does not belong.
+//!
+//! promise: kept-design
 
 mod common;
 

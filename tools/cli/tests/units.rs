@@ -1,5 +1,7 @@
 //! Units: plants in units of any size are designed without nominal values, those given are kept, and a
 //! verdict names the keys that would change it.
+//!
+//! promise: any-units
 
 mod common;
 

@@ -134,6 +134,7 @@ pub(crate) fn maximise(
     let mut best = None;
     let mut earlier = Vec::new();
     let mut next = FIRST_GAP;
+    let mut bound = f64::INFINITY;
     for iteration in 0..settings.iterations {
         watch(iteration);
         let residuals = iterate.residuals(problem);
@@ -145,6 +146,7 @@ pub(crate) fn maximise(
             next = gap / GAP_BETWEEN;
         }
         let stop = solution.converged || solution.exhausted;
+        bound = bound.min(solution.bound);
         if solution.feasible || best.is_none() {
             best = Some(solution);
         }
@@ -156,7 +158,11 @@ pub(crate) fn maximise(
         }
     }
     let best = best.filter(|solution: &Solution| solution.iterations > 0)?;
-    Some(Solution { earlier, ..best })
+    Some(Solution {
+        earlier,
+        bound,
+        ..best
+    })
 }
 
 impl Iterate {

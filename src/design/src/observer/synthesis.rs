@@ -169,7 +169,7 @@ impl ErrorModel {
             if let Err(magnitude) = found {
                 let above = (magnitude * 1e4).ceil() / 1e4;
                 let reason = match above < 1.0 {
-                    true => format!("ask for an observer.decay above {above}"),
+                    true => format!("ask for an observer.decay above {above:.4}"),
                     false => "use a luenberger observer (observer.kind) or more sensors".into(),
                 };
                 return Err(DesignError::Request(format!(

@@ -2,7 +2,7 @@
 //! even that would take minutes.
 
 use super::frame::{Frame, Part};
-use super::synthesis::{Levels, Optimum, Road, SACRIFICES};
+use super::synthesis::{AGREEMENT, Levels, Optimum, REFRAMINGS, Road, SACRIFICES};
 use super::{REJECTION, StateFeedback, riccati, structured};
 use crate::Lyapunov;
 
@@ -11,6 +11,9 @@ const LARGEST_WORK: f64 = 6e11;
 
 /// Iterations of all solutions of one problem.
 const ITERATIONS: f64 = 45.0;
+
+/// Augmented states of all modes up to which the general solver is asked where this one leaves doubt.
+const SMALL: usize = 24;
 
 /// How many points of the central path are tried.
 const CENTRED: usize = 5;
@@ -26,6 +29,8 @@ pub(super) struct Found {
     pub optimum: Optimum,
     /// Levels that were passed, the largest first, with gains and Lyapunov matrices.
     centred: Vec<(f64, Vec<Part>)>,
+    /// Whether other coordinates might show less.
+    doubtful: bool,
 }
 
 impl Road<'_> {
@@ -39,7 +44,7 @@ impl Road<'_> {
         }
         let least = groups.iter().map(|group| {
             let regulated = Frame::of_regulated(&self.models, group, self.spec.decay)?;
-            self.direct_level(&regulated.with_signals(&self.models, group), group)
+            self.settled_level(&regulated.with_signals(&self.models, group), group)
         });
         let mut least = least.collect::<Option<Vec<_>>>()?;
         let (smallest, others) = SACRIFICES.split_first()?;
@@ -109,13 +114,35 @@ impl Road<'_> {
         Some(frame.restore(found))
     }
 
+    /// The least level of a group, sought from these coordinates and again from those it suggests while
+    /// the answer leaves doubt and improves.
+    pub(super) fn settled_level(&self, frame: &Frame, group: &[usize]) -> Option<Found> {
+        let mut found = self.direct_level(frame, group)?;
+        for _ in 0..REFRAMINGS {
+            if !found.doubtful {
+                break;
+            }
+            let again = self.direct_level(&found.optimum.frame, group);
+            let settled = found.optimum.level * (1.0 - AGREEMENT);
+            match again {
+                Some(again) if again.optimum.level < settled => found = again,
+                _ => break,
+            }
+        }
+        Some(found)
+    }
+
     /// The least level of a group, sought in these coordinates.
     pub(super) fn direct_level(&self, frame: &Frame, group: &[usize]) -> Option<Found> {
         let models = &self.models;
         let floor = frame.view_level(REJECTION.powi(2));
         let view = frame.view(models);
         let path = structured::least_level(&view, self.spec, group, floor, &self.run).ok()?;
-        let level = frame.restore_level(path.level);
+        let (level, bound) = (
+            frame.restore_level(path.level),
+            frame.restore_level(path.bound),
+        );
+        let optimal = level < (1.0 + AGREEMENT) * bound.max(REJECTION.powi(2));
         let centred: Vec<_> = path
             .centred
             .into_iter()
@@ -129,10 +156,11 @@ impl Road<'_> {
         Some(Found {
             optimum: Optimum {
                 level,
-                bound: frame.restore_level(path.bound),
+                bound,
                 frame: Frame::of_attenuated(models, &parts, level)?,
             },
             centred,
+            doubtful: path.at_reach || !optimal,
         })
     }
 
@@ -155,6 +183,11 @@ impl Road<'_> {
             parts.extend(least.frame.restore(vec![found.part]));
         }
         self.certified(parts, Some(levels)).ok()
+    }
+
+    /// Whether the general solver would answer in seconds.
+    pub(super) fn is_small(&self) -> bool {
+        self.models[0].a.nrows() * self.models.len() <= SMALL
     }
 
     /// Floating-point operations of a `dwell` design by the interior-point method.

@@ -26,6 +26,9 @@ use nalgebra::DMatrix;
 /// How far, as a factor, Lyapunov matrices may be from the identity on average.
 const REACH: f64 = 1e6;
 
+/// Share of that at which the limit counts as felt.
+const AT_REACH: f64 = 1e-2;
+
 /// How much larger than the identity the Lyapunov matrices of a centred solution may be on average.
 const ROOM: f64 = 10.0;
 
@@ -312,6 +315,8 @@ pub(super) struct Path {
     pub level: f64,
     /// Below this no `g` is reached, in the method's view; zero where it cannot tell.
     pub bound: f64,
+    /// Whether larger Lyapunov matrices might reach less.
+    pub at_reach: bool,
     /// Gains and Lyapunov matrices there.
     pub parts: Vec<Part>,
     /// Levels that were passed, the largest first, with what satisfies their inequalities strictly.
@@ -348,7 +353,10 @@ pub(super) fn least_level(
         theorem.read(&centred.point).map(|parts| (level, parts))
     });
     let positive = solution.earlier.iter().all(|centred| centred.value > 0.0);
+    let traces: f64 = solution.point.symmetric.iter().map(DMatrix::trace).sum();
+    let reach = REACH * (theorem.problem.symmetric * theorem.problem.order) as f64;
     Ok(Path {
+        at_reach: traces > AT_REACH * reach,
         level: 1.0 / solution.value,
         bound: 1.0 / solution.bound.max(solution.value),
         centred: if positive {

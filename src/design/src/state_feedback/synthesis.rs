@@ -32,10 +32,10 @@ const SURE_MARGIN: f64 = 1e-6;
 const THICK_MARGIN: f64 = 1e-2;
 
 /// How often better coordinates are sought.
-const REFRAMINGS: usize = 12;
+pub(super) const REFRAMINGS: usize = 12;
 
 /// A least level that better coordinates change by less than this, relatively, is the least.
-const AGREEMENT: f64 = 1e-5;
+pub(super) const AGREEMENT: f64 = 1e-5;
 
 /// Designs the state feedback that is asked for and proves it.
 ///
@@ -95,24 +95,47 @@ fn attempt(
     };
     let disturbed = road.models.iter().any(|model| model.e.amax() > 0.0);
     let optimised = spec.objective == Objective::Attenuation && disturbed;
-    if optimised && run.solver == Solver::Structured {
-        if let Some(design) = road.direct() {
-            return Ok(design);
-        }
+    if !(optimised && run.solver == Solver::Structured) {
+        return road.step_by_step(optimised);
     }
-    let mut stable = Vec::new();
-    for group in road.groups() {
-        match road.stabilised(&group)? {
-            Verdict::Stable(parts) => stable.push(parts),
-            Verdict::Conflict(margin) => {
-                return Err(infeasible(margin.margin, margin.weights));
-            }
-        }
+    let Some(direct) = road.direct() else {
+        return road.step_by_step(true);
+    };
+    if is_sharp(&direct) || !road.is_small() {
+        return Ok(direct);
     }
-    match optimised {
-        true => road.attenuate(&stable),
-        false => road.certified(stable.concat(), None),
-    }
+    (run.watch)(Step::GeneralSolver);
+    let general = Road {
+        run: Run {
+            solver: Solver::General,
+            ..*run
+        },
+        ..road
+    };
+    Ok(match general.step_by_step(true) {
+        Ok(other) if is_sharp(&other) || largest_gamma(&other) < largest_gamma(&direct) => other,
+        _ => direct,
+    })
+}
+
+/// Whether every mode's gamma is known to be the optimum to four digits, or as good as zero.
+fn is_sharp(design: &StateFeedback) -> bool {
+    const SHARP: f64 = 1e-4;
+    let pairs = design
+        .gamma
+        .iter()
+        .flatten()
+        .zip(design.optimum.iter().flatten());
+    let units = &design.certificate.units;
+    let rejection = 2.0 * REJECTION * units.performance / units.disturbance;
+    let sharp =
+        |(gamma, optimum): (&f64, &f64)| *gamma < (1.0 + SHARP) * optimum || *gamma < rejection;
+    pairs.into_iter().all(sharp)
+}
+
+fn largest_gamma(design: &StateFeedback) -> f64 {
+    let gamma = design.gamma.iter().flatten().copied();
+    gamma.fold(0.0, f64::max)
 }
 
 /// Whether a request leads all the way to certified gains. The cheap question comes first: whether
@@ -251,6 +274,23 @@ impl Road<'_> {
         self.spec.lyapunov.groups(self.models.len())
     }
 
+    /// Step by step: stabilising gains first, which decides feasibility, then the least level from there.
+    fn step_by_step(&self, optimised: bool) -> Result<StateFeedback, DesignError> {
+        let mut stable = Vec::new();
+        for group in self.groups() {
+            match self.stabilised(&group)? {
+                Verdict::Stable(parts) => stable.push(parts),
+                Verdict::Conflict(margin) => {
+                    return Err(infeasible(margin.margin, margin.weights));
+                }
+            }
+        }
+        match optimised {
+            true => self.attenuate(&stable),
+            false => self.certified(stable.concat(), None),
+        }
+    }
+
     /// Stabilising gains of a group (T1).
     fn stabilised(&self, group: &[usize]) -> Result<Verdict, SolverFailure> {
         Ok(match stable(&self.models, self.spec, group, &self.run)? {
@@ -270,7 +310,7 @@ impl Road<'_> {
         let mut frame =
             Frame::of_stabilised(models, start).unwrap_or_else(|| Frame::identity(size, inputs));
         if self.run.solver == Solver::Structured {
-            if let Some(found) = self.direct_level(&frame, group) {
+            if let Some(found) = self.settled_level(&frame, group) {
                 return Ok(found.optimum);
             }
             (self.run.watch)(Step::GeneralSolver);
