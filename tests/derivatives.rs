@@ -8,7 +8,7 @@
 mod common;
 
 use common::{Channel, controller, plant, reference, scenario};
-use ftc_control::parameters::{Compensation, EstimatorMethod, Limits};
+use ftc_control::parameters::{Compensation, EstimatorMethod, Limits, Transfer};
 use ftc_control::{Compensate, Controller, ControllerParameters, ControllerState, Sample};
 use ftc_plant::rectifier::Rectifier;
 use ftc_plant::scenario::{FaultEvent, FaultKind, ModeInterval, Waveform};
@@ -61,7 +61,10 @@ fn parameters(design: Design) -> ControllerParameters {
     parameters.estimator.method = design.method;
     parameters.estimator.adapt = design.adapt;
     parameters.feedback.latency = design.latency;
-    parameters.feedback.bumpless = design.bumpless;
+    parameters.feedback.transfer = design.bumpless.then_some(Transfer {
+        samples: 1,
+        decay: 0.5,
+    });
     if design.latency == 1 {
         for gains in &mut parameters.feedback.modes {
             gains.previous_input = DMatrix::from_element(2, 2, -0.2);

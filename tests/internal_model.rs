@@ -61,6 +61,7 @@ fn design(channel: Channel, control: ControlSpec) -> Design {
             inputs: signals("u"),
             outputs: signals("y"),
             states: signals("x"),
+            disturbances: Vec::new(),
         },
         plant: plant(channel),
         bumpless: false,

@@ -75,6 +75,7 @@ fn design(model: &SwitchedPlant, truth: &SwitchedPlant, noise: f64) -> Design {
             inputs: signals("u"),
             outputs: signals("y"),
             states: signals("x"),
+            disturbances: Vec::new(),
         },
         plant: model.clone(),
         truth: ftc_plant::Truth::AsDesigned,

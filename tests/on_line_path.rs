@@ -5,6 +5,7 @@
 mod common;
 
 use common::{Channel, controller, reference, scenario};
+use ftc_control::parameters::Transfer;
 use ftc_control::{Compensate, Controller, ControllerState, Sample};
 use ftc_simulate::{PlantSimulator, Variant, run};
 use proptest::prelude::*;
@@ -124,26 +125,40 @@ fn the_same_inputs_give_the_same_bits_and_a_copy_is_a_snapshot() {
     assert_eq!(state, copy);
 }
 
-/// With `bumpless`, the first command in a mode is the last of the mode before.
+/// With bumpless transfer, the first command in a mode is the last of the mode before, unless the last
+/// transfer was too short a time ago.
 #[test]
 fn a_bumpless_switch_leaves_the_command_where_it_was() {
-    for bumpless in [false, true] {
+    for transfer in [
+        None,
+        Some(Transfer {
+            samples: 5,
+            decay: 0.5,
+        }),
+    ] {
         let mut parameters = controller(Channel::State, 0.0);
-        parameters.feedback.bumpless = bumpless;
+        parameters.feedback.transfer = transfer;
         let controller = Controller::new(parameters);
         let mut state = controller.initial_state(0);
+        let mut jump = |k: u64, mode: usize| {
+            let before = state.command.clone();
+            let (y, reference) = ([0.2, -0.1], [0.25, -0.15]);
+            tick(&controller, &mut state, k, mode, &y, &reference);
+            let moved = state.command.iter().zip(&before);
+            moved.map(|(a, b)| (a - b).abs()).fold(0.0, f64::max)
+        };
         for k in 0..50 {
-            tick(&controller, &mut state, k, 0, &[0.2, -0.1], &[0.25, -0.15]);
+            jump(k, 0);
         }
-        let before = state.command.clone();
-        tick(&controller, &mut state, 50, 1, &[0.2, -0.1], &[0.25, -0.15]);
-        let jump = state
-            .command
-            .iter()
-            .zip(&before)
-            .map(|(a, b)| (a - b).abs())
-            .fold(0.0, f64::max);
-        assert_eq!(bumpless, jump < 1e-9, "jump {jump}");
+        assert_eq!(transfer.is_some(), jump(50, 1) < 1e-14);
+        assert!(
+            jump(51, 0) > 1e-3,
+            "two samples are too few for another transfer"
+        );
+        for k in 52..60 {
+            jump(k, 0);
+        }
+        assert_eq!(transfer.is_some(), jump(60, 1) < 1e-14);
     }
 }
 

@@ -17,6 +17,25 @@ pub fn read_design(bytes: &[u8]) -> Result<Design, String> {
     Ok(design)
 }
 
+/// The disturbances as described, or else by their number alone.
+fn disturbances(design: &Design, count: usize) -> Vec<SignalInfo> {
+    let described = &design.signals.disturbances;
+    (0..count)
+        .map(|at| match described.get(at) {
+            Some(signal) => SignalInfo {
+                name: signal.name.clone(),
+                unit: signal.unit.clone().unwrap_or_default(),
+                nominal: Some(signal.nominal),
+                ..SignalInfo::default()
+            },
+            None => SignalInfo {
+                nominal: Some(1.0),
+                ..SignalInfo::default()
+            },
+        })
+        .collect()
+}
+
 impl From<&Design> for Interface {
     fn from(design: &Design) -> Self {
         let plant = &design.controller.plant;
@@ -47,7 +66,7 @@ impl From<&Design> for Interface {
             outputs: describe(&design.signals.outputs, point.map(|p| &p.y)),
             states: describe(&design.signals.states, point.map(|p| &p.x)),
             tracked: design.controller.feedback.tracked.clone(),
-            disturbances: plant.dimensions().disturbances,
+            disturbances: disturbances(design, plant.dimensions().disturbances),
             modes: plant.modes.len(),
             thresholds: design.controller.estimator.thresholds.clone(),
         }

@@ -10,7 +10,7 @@ pub const PLANT: &str = "ftc_plant";
 
 /// Version of the variable tables: raised whenever a table changes for the same design, so that
 /// a description written by one release is refused by the binary of another.
-const TABLE_VERSION: u32 = 1;
+const TABLE_VERSION: u32 = 2;
 
 /// The `guid` of an FMU: a fingerprint of its binary's identifier and of its design's bytes.
 ///

@@ -41,8 +41,8 @@ pub struct Interface {
     pub states: Vec<SignalInfo>,
     /// Tracked outputs, positions in `outputs` counted from 0 (r).
     pub tracked: Vec<usize>,
-    /// Number of disturbances (s).
-    pub disturbances: usize,
+    /// Disturbances (s).
+    pub disturbances: Vec<SignalInfo>,
     /// Number of modes.
     pub modes: usize,
     /// Residual thresholds at the start (p).
@@ -51,8 +51,8 @@ pub struct Interface {
 
 /// The controller's variables.
 ///
-/// Inputs `y`, `y_ref`, `mode`, `mode_real`; outputs `u`, `x_hat`, `f_hat`, `residual`, `fault`;
-/// tunable parameters `ftc_enabled`, `threshold`.
+/// Inputs `y`, `y_ref`, `mode`, `mode_real`; outputs `u`, `x_hat`, `f_hat`, `residual`, `fault`,
+/// `fault_real`; tunable parameters `ftc_enabled`, `threshold`.
 pub fn controller(interface: &Interface) -> VariableTable {
     let inputs = &named("u", &interface.inputs);
     let outputs = &named("y", &interface.outputs);
@@ -86,23 +86,25 @@ pub fn controller(interface: &Interface) -> VariableTable {
         "Estimated sensor fault of",
         Role::FaultEstimate,
         &deviations(outputs),
-        Range::Open,
+        Range::Difference,
     ));
     table.extend(output.vector(
         "residual",
         "Measured less predicted",
         Role::Residual,
         &deviations(outputs),
-        Range::Open,
+        Range::Difference,
     ));
-    table.extend(outputs.iter().enumerate().map(|(at, signal)| {
+    let flags = || outputs.iter().enumerate();
+    table.extend(flags().map(|(at, signal)| {
         output.boolean(
             format!("fault[{}]", at + 1),
-            format!("Sensor fault flagged on {}", signal.name),
+            phrase("Sensor fault flagged on", &signal.name),
             Role::FaultFlag,
             false,
         )
     }));
+    table.extend(flags().map(|(at, signal)| output.flag_real(at, &signal.name)));
 
     let tunable = Maker::parameter(Variability::Tunable);
     table.push(tunable.boolean(
@@ -126,7 +128,7 @@ pub fn controller(interface: &Interface) -> VariableTable {
         "Residual that flags a fault of",
         Role::Threshold,
         &thresholds,
-        Range::Closed,
+        Range::Difference,
     ));
 
     let modes = vec![scalar(mode), scalar(real)];
@@ -147,7 +149,8 @@ pub fn plant(interface: &Interface) -> VariableTable {
     let outputs = &named("y", &interface.outputs);
     let states = &named("x", &interface.states);
     let references = interface.references(outputs);
-    let disturbances = named("w", &vec![SignalInfo::default(); interface.disturbances]);
+    let disturbances = named("w", &interface.disturbances);
+    let disturbances = deviations(&disturbances);
     let faults = deviations(outputs);
     let mut table = VariableTable::new();
 
@@ -158,16 +161,16 @@ pub fn plant(interface: &Interface) -> VariableTable {
         "Sensor fault added to",
         Role::ExternalFault,
         &faults,
-        Range::Open,
+        Range::Difference,
     ));
     let w_ext = table.extend(input.vector(
         "w_ext",
-        "Added disturbance",
+        "Added to the disturbance",
         Role::ExternalDisturbance,
         &disturbances,
-        Range::Open,
+        Range::Difference,
     ));
-    let external = "Active mode while the scenario is off";
+    let external = "Mode to be active while the scenario is off";
     let mode_ext =
         scalar(table.push(input.mode("mode_ext", Role::ExternalMode, external, interface.modes)));
     let mode_real = scalar(table.push(input.mode_real(
@@ -189,13 +192,19 @@ pub fn plant(interface: &Interface) -> VariableTable {
     ));
     table.push(output.mode("mode", Role::Mode, "Active mode", interface.modes));
     table.push(output.mode_real("mode_real", Role::ModeReal, interface.modes));
-    table.extend(output.vector("f", "Sensor fault of", Role::Fault, &faults, Range::Open));
+    table.extend(output.vector(
+        "f",
+        "Sensor fault of",
+        Role::Fault,
+        &faults,
+        Range::Difference,
+    ));
     table.extend(output.vector(
         "w",
         "Disturbance",
         Role::Disturbance,
         &disturbances,
-        Range::Open,
+        Range::Difference,
     ));
 
     let fixed = Maker::parameter(Variability::Fixed);
@@ -273,6 +282,26 @@ fn scalar(reference: u32) -> Span {
 enum Range {
     Open,
     Closed,
+    /// It is, if any, that of a difference of two values: an offset of the unit drops out.
+    Difference,
+}
+
+/// What a variable is, and of which signal: `Command of heater power`. A word that the user's
+/// name has at its end is not said twice: the command of `active current command`.
+fn phrase(what: &str, name: &str) -> String {
+    let noun = what.strip_suffix(" of").unwrap_or(what);
+    let repeated = name.get(name.len().saturating_sub(noun.len())..);
+    match repeated {
+        Some(end) if noun != what && end.eq_ignore_ascii_case(noun) => {
+            let rest = name[..name.len() - noun.len()].trim_end();
+            if rest.is_empty() {
+                noun.into()
+            } else {
+                format!("{what} {rest}")
+            }
+        }
+        _ => format!("{what} {name}"),
+    }
 }
 
 /// Makes variables of one causality and variability.
@@ -335,7 +364,7 @@ impl Maker {
         let make = |(at, signal): (usize, &SignalInfo)| {
             let (min, max) = match range {
                 Range::Open => (None, None),
-                Range::Closed => (signal.min, signal.max),
+                Range::Closed | Range::Difference => (signal.min, signal.max),
             };
             let kind = Kind::Real {
                 unit: (!signal.unit.is_empty()).then(|| signal.unit.clone()),
@@ -343,13 +372,14 @@ impl Maker {
                 nominal: signal.nominal,
                 min,
                 max,
+                relative: range == Range::Difference,
             };
             let start = signal
                 .start
                 .max(min.unwrap_or(f64::NEG_INFINITY))
                 .min(max.unwrap_or(f64::INFINITY));
             let name = format!("{base}[{}]", at + 1);
-            let description = format!("{what} {}", signal.name);
+            let description = phrase(what, &signal.name);
             self.variable(name, description, kind, role, start)
         };
         signals.iter().enumerate().map(make).collect()
@@ -365,37 +395,78 @@ impl Maker {
         )
     }
 
-    fn mode(&self, name: &str, role: Role, what: &str, modes: usize) -> Variable {
-        let kind = Kind::Integer {
-            min: Some(1),
-            max: i32::try_from(modes).ok(),
-        };
+    /// A flag as a Real: 1 where it is raised.
+    fn flag_real(&self, at: usize, name: &str) -> Variable {
+        let kind = pure_number(Some(0.0), Some(1.0));
+        let what = "1 where a sensor fault is flagged, else 0, as a Real, on";
         self.variable(
-            name.into(),
-            format!("{what}, counted from 1"),
+            format!("fault_real[{}]", at + 1),
+            phrase(what, name),
             kind,
-            role,
-            1.0,
+            Role::FaultFlagReal,
+            0.0,
         )
     }
 
-    fn mode_real(&self, name: &str, role: Role, modes: usize) -> Variable {
+    /// A mode that comes in may be 0: it has not been told, or comes by the Real twin.
+    fn mode(&self, name: &str, role: Role, what: &str, modes: usize) -> Variable {
         let input = self.causality == Causality::Input;
-        let kind = Kind::Real {
-            unit: None,
-            display_unit: None,
-            nominal: None,
-            min: Some(if input { 0.0 } else { 1.0 }),
-            max: Some(modes as f64),
-        };
-        let (description, start) = if input {
-            (
-                "The mode as a Real, for tools that connect no Integer; 0 when not connected",
-                0.0,
-            )
+        let (least, more) = if input {
+            (0, "; 0 while it is not told, or where it comes as a Real")
         } else {
-            ("The mode as a Real, for tools that connect no Integer", 1.0)
+            (1, "")
         };
-        self.variable(name.into(), description.into(), kind, role, start)
+        let kind = Kind::Integer {
+            min: Some(least),
+            max: i32::try_from(modes).ok(),
+        };
+        let description = format!("{what}, counted from 1{more}");
+        self.variable(name.into(), description, kind, role, f64::from(least))
+    }
+
+    fn mode_real(&self, name: &str, role: Role, modes: usize) -> Variable {
+        let (least, more) = match self.causality {
+            Causality::Input => (0.0, "; 0 when not connected"),
+            _ => (1.0, ""),
+        };
+        let kind = pure_number(Some(least), Some(modes as f64));
+        let description = format!("The mode as a Real, for tools that connect no Integer{more}");
+        self.variable(name.into(), description, kind, role, least)
+    }
+}
+
+/// A Real without a unit.
+fn pure_number(min: Option<f64>, max: Option<f64>) -> Kind {
+    Kind::Real {
+        unit: None,
+        display_unit: None,
+        nominal: None,
+        min,
+        max,
+        relative: false,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::phrase;
+
+    #[test]
+    fn descriptions_read_as_english() {
+        for (what, name, expected) in [
+            (
+                "Command of",
+                "active current command",
+                "Command of active current",
+            ),
+            ("Command of", "heater power", "Command of heater power"),
+            ("Command of", "command", "Command"),
+            ("Command of", "u[1]", "Command of u[1]"),
+            ("Reference of", "Speed Reference", "Reference of Speed"),
+            ("Measured", "DC voltage", "Measured DC voltage"),
+            ("Estimate of", "é", "Estimate of é"),
+        ] {
+            assert_eq!(phrase(what, name), expected);
+        }
     }
 }

@@ -7,9 +7,14 @@
 #[cfg(feature = "xml")]
 pub(crate) const BASE: [&str; 6] = ["kg", "m", "s", "A", "K", "rad"];
 
-/// Exponents of the base units, and the factor to the SI unit.
+/// A unit in SI: `SI value = factor * value + offset`, in these powers of the base units.
 #[cfg(feature = "xml")]
-pub(crate) type Meaning = ([i8; 6], f64);
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Meaning {
+    pub exponents: [i8; 6],
+    pub factor: f64,
+    pub offset: f64,
+}
 
 /// Display units: `display = factor * unit`.
 const DISPLAYS: [(&str, &str, f64); 4] = [
@@ -22,17 +27,21 @@ const DISPLAYS: [(&str, &str, f64); 4] = [
 /// What a unit means in SI base units, if it is a known one.
 #[cfg(feature = "xml")]
 pub(crate) fn meaning(unit: &str) -> Option<Meaning> {
-    Some(match unit {
+    let (exponents, factor) = match unit {
         "1" => ([0, 0, 0, 0, 0, 0], 1.0),
         "%" => ([0, 0, 0, 0, 0, 0], 0.01),
         "kg" => ([1, 0, 0, 0, 0, 0], 1.0),
         "m" => ([0, 1, 0, 0, 0, 0], 1.0),
         "mm" => ([0, 1, 0, 0, 0, 0], 1e-3),
         "s" => ([0, 0, 1, 0, 0, 0], 1.0),
+        "min" => ([0, 0, 1, 0, 0, 0], 60.0),
+        "h" => ([0, 0, 1, 0, 0, 0], 3600.0),
         "ms" => ([0, 0, 1, 0, 0, 0], 1e-3),
         "A" => ([0, 0, 0, 1, 0, 0], 1.0),
         "mA" => ([0, 0, 0, 1, 0, 0], 1e-3),
-        "K" => ([0, 0, 0, 0, 1, 0], 1.0),
+        "K" | "degC" => ([0, 0, 0, 0, 1, 0], 1.0),
+        "deg" => ([0, 0, 0, 0, 0, 1], std::f64::consts::PI / 180.0),
+        "rpm" => ([0, 0, -1, 0, 0, 1], std::f64::consts::PI / 30.0),
         "rad" => ([0, 0, 0, 0, 0, 1], 1.0),
         "rad/s" => ([0, 0, -1, 0, 0, 1], 1.0),
         "Hz" => ([0, 0, -1, 0, 0, 0], 1.0),
@@ -49,7 +58,18 @@ pub(crate) fn meaning(unit: &str) -> Option<Meaning> {
         "V" => ([1, 2, -3, -1, 0, 0], 1.0),
         "kV" => ([1, 2, -3, -1, 0, 0], 1e3),
         "Ohm" => ([1, 2, -3, -2, 0, 0], 1.0),
+        "degF" => ([0, 0, 0, 0, 1, 0], 5.0 / 9.0),
         _ => return None,
+    };
+    let offset = match unit {
+        "degC" => 273.15,
+        "degF" => 273.15 - 32.0 * 5.0 / 9.0,
+        _ => 0.0,
+    };
+    Some(Meaning {
+        exponents,
+        factor,
+        offset,
     })
 }
 

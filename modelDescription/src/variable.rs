@@ -48,6 +48,8 @@ pub enum Kind {
         min: Option<f64>,
         /// Greatest value.
         max: Option<f64>,
+        /// Whether it is a difference, which a unit's offset does not apply to.
+        relative: bool,
     },
     /// 32 bit signed.
     Integer {
@@ -70,7 +72,7 @@ pub enum Role {
     Measurement,
     /// `y_ref`, references of the tracked outputs (r).
     Reference,
-    /// `mode`, the active mode counted from 1.
+    /// `mode`, the active mode counted from 1; as an input, 0 means not told yet.
     Mode,
     /// `mode_real`, the mode as a Real; 0 means not connected.
     ModeReal,
@@ -84,6 +86,8 @@ pub enum Role {
     Residual,
     /// `fault`, flags (p).
     FaultFlag,
+    /// `fault_real`, the flags as Reals (p).
+    FaultFlagReal,
     /// `ftc_enabled`, switches the compensation.
     FtcEnabled,
     /// `threshold`, of the residuals (p).

@@ -167,17 +167,29 @@ fn write_units(writer: &mut Writer<Vec<u8>>, table: &VariableTable) -> io::Resul
     })
 }
 
+/// The attributes of a unit's `BaseUnit` in FMI and SSP: powers of SI base units, factor and
+/// offset; none for a unit that is not known.
+pub fn base_unit(unit: &str) -> Option<Vec<(&'static str, String)>> {
+    let meaning = meaning(unit)?;
+    let mut attributes: Attributes = BASE
+        .iter()
+        .zip(meaning.exponents)
+        .filter(|(_, exponent)| *exponent != 0)
+        .map(|(base, exponent)| (*base, exponent.to_string()))
+        .collect();
+    for (name, value, usual) in [
+        ("factor", meaning.factor, 1.0),
+        ("offset", meaning.offset, 0.0),
+    ] {
+        attributes.extend((value != usual).then(|| (name, number(value))));
+    }
+    Some(attributes)
+}
+
 /// Declares one unit with those of the wanted display units that are known for it.
 fn write_unit(writer: &mut Writer<Vec<u8>>, unit: &str, displays: &[&str]) -> io::Result<()> {
     parent(writer, "Unit", vec![("name", unit.to_string())], |writer| {
-        if let Some((exponents, factor)) = meaning(unit) {
-            let mut attributes: Attributes = BASE
-                .iter()
-                .zip(exponents)
-                .filter(|(_, exponent)| *exponent != 0)
-                .map(|(base, exponent)| (*base, exponent.to_string()))
-                .collect();
-            attributes.extend((factor != 1.0).then(|| ("factor", number(factor))));
+        if let Some(attributes) = base_unit(unit) {
             leaf(writer, "BaseUnit", attributes)?;
         }
         displays.iter().try_for_each(|display| {
@@ -226,9 +238,15 @@ fn kind_element(variable: &Variable, with_start: bool) -> (&'static str, Attribu
             nominal,
             min,
             max,
+            relative,
         } => {
             add("unit", unit.clone());
             add("displayUnit", display_unit.clone());
+            // The standard ties this attribute to a unit.
+            add(
+                "relativeQuantity",
+                (*relative && unit.is_some()).then(|| "true".into()),
+            );
             add("min", min.map(number));
             add("max", max.map(number));
             add("nominal", nominal.map(number));

@@ -24,7 +24,7 @@ fn sized([n, m, p, r, s, modes]: [usize; 6]) -> Interface {
         outputs: anonymous(p),
         states: anonymous(n),
         tracked: (0..r).collect(),
-        disturbances: s,
+        disturbances: anonymous(s),
         modes,
         thresholds: vec![0.5; p],
     }
@@ -93,7 +93,7 @@ fn names_are_the_contract() {
     };
     let design = sized([1, 2, 2, 1, 1, 2]);
     let expected = "y[1] y[2] y_ref[1] mode mode_real u[1] u[2] x_hat[1] f_hat[1] f_hat[2] \
-                    residual[1] residual[2] fault[1] fault[2] ftc_enabled threshold[1] threshold[2]";
+                    residual[1] residual[2] fault[1] fault[2] fault_real[1] fault_real[2] ftc_enabled threshold[1] threshold[2]";
     assert_eq!(names(controller(&design)).join(" "), expected);
     let expected = "u[1] u[2] f_ext[1] f_ext[2] w_ext[1] mode_ext mode_ext_real y[1] y[2] \
                     y_true[1] y_true[2] x[1] y_ref[1] mode mode_real f[1] f[2] w[1] \
@@ -184,6 +184,7 @@ fn good() -> Variable {
             nominal: None,
             min: Some(-1.0),
             max: Some(1.0),
+            relative: false,
         },
         causality: Causality::Input,
         variability: Variability::Discrete,
@@ -238,6 +239,7 @@ fn each_kind_of_nonsense_is_named() {
                 nominal: Some(0.0),
                 min: None,
                 max: None,
+                relative: false,
             }
         }),
     ];

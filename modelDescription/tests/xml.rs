@@ -23,7 +23,7 @@ fn interface() -> Interface {
         outputs: vec![signal("speed", "rad/s"), signal("", "odd & unit")],
         states: vec![signal("", ""), signal("", "rad")],
         tracked: vec![1],
-        disturbances: 1,
+        disturbances: vec![signal("draught", "degC")],
         modes: 2,
         thresholds: vec![0.25, 0.5],
     }

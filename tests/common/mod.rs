@@ -106,7 +106,6 @@ pub fn scenario(reference: Waveform, noise: f64, disturbances: usize) -> Scenari
 pub fn controller(channel: Channel, noise: f64) -> ControllerParameters {
     let plant = plant(channel);
     let gains = |state_feedback: DMatrix<f64>, integral: DMatrix<f64>| FeedbackGains {
-        integral_inverse: integral.clone().try_inverse().unwrap(),
         output_feedback: state_feedback.clone(), // both states are measured
         state_feedback,
         feedforward: &integral * plant.sample_time,
@@ -150,7 +149,7 @@ pub fn controller(channel: Channel, noise: f64) -> ControllerParameters {
             tracked: vec![0, 1],
             latency: 0,
             resonators: vec![],
-            bumpless: false,
+            transfer: None,
             modes: vec![
                 gains(
                     dmatrix![0.199, -0.827; -1.125, -0.447],

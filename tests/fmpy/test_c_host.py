@@ -34,3 +34,18 @@ def test_every_life_of_an_instance(
 def test_eight_threads_at_once(tmp_path: Path, example_case: Callable[[str], Case]) -> None:
     """Loops in eight threads give the bits of one by itself; `make threadcheck` watches them do so."""
     assert c_host.close_in_threads(example_case("paper").fmus, tmp_path).startswith("8 threads")
+
+
+@pytest.mark.parametrize("which", ["controller", "plant"])
+def test_memory_that_runs_out_is_an_answer(tmp_path: Path, example_case: Callable[[str], Case], which: str) -> None:
+    """Each allocation fails in turn: NULL or fmi2Error, nothing leaks, and the next call succeeds.
+
+    promise: short-memory
+    """
+    fmu = getattr(example_case("paper").fmus, which)
+    met = c_host.exhaust(c_host.build(tmp_path, "memory"), fmu)
+    assert met["instantiate"] > 100
+    assert met["save"] > 10
+    assert met["deserialize"] > 10
+    assert met["refused"] > 5
+    assert met["serialize"] == met["reset"] == 0, "these take no memory"

@@ -112,6 +112,7 @@ pub fn design(dice: &mut Dice) -> Design {
                 inputs: signals("u", m),
                 outputs: signals("y", p),
                 states: signals("x", n),
+                disturbances: Vec::new(),
             },
             plant,
             control,

@@ -364,6 +364,7 @@ class Loop:
         internal = InternalModel(self.design)
         x, u, Z = self.true_modes[mode].x0, start.u0, np.zeros(len(internal.M))
         model_run = start.x0
+        transfer, offset, since = feedback["transfer"], np.zeros(len(u)), math.inf
         estimator.past = [u] * estimator.length
         rows: dict[str, list] = {}
         for tick in range(self.design["scenario"]["steps"]):
@@ -387,15 +388,17 @@ class Loop:
                 far = np.abs(y_c - modelled) > 4.0 * np.array(estimator.settings["thresholds"])
                 y_c = np.where(estimator.enabled & held & far, modelled, y_c)
             observer.correct(mode, y_c)
-            if mode != left and feedback["bumpless"]:
-                G = np.array(feedback["modes"][mode]["integral"])
-                Z = Z + np.linalg.pinv(G) @ (u - self.command(mode, observer.x_hat, Z, y_ref, u))
             wanted = self.command(mode, observer.x_hat, Z, y_ref, u)
+            since += 1
+            if mode != left and transfer and since >= transfer["samples"]:
+                offset, since = u - wanted, 0
+            wanted = wanted + offset
             u_old, u = u, self.saturate(wanted)
             acting = u_old if feedback["latency"] else u
 
             unwinding = np.array(feedback["modes"][mode]["anti_windup"])
             Z = internal.M @ Z + internal.N @ (te * (y_ref - y_c[feedback["tracked"]])) + unwinding @ (u - wanted)
+            offset = offset * (transfer["decay"] if transfer else 0.0)
             observer.advance(mode, acting, y_c)
             here = self.modes[mode]
             model_run = here.A @ model_run + here.B @ acting + here.a if held.any() else observer.prior

@@ -58,6 +58,7 @@ def finished(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFa
     """Returns scenario A designed with the model's own predictor, the disturbance on either channel."""
     design = design_file.scenario_a(disturbed=request.param)
     design["estimator"]["database"] = "model"
+    design["observer"]["kind"] = "uio" if request.param == "state" else "luenberger"
     folder: Path = tmp_path_factory.mktemp(request.param)
     path = design_file.write(design, folder)
     report = json.loads(commands.ftc_fmu("design", path, "--json"))

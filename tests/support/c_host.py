@@ -20,7 +20,17 @@ STEPS = 60
 def build(folder: Path, name: str = "drive") -> Path:
     """Compiles a program, every warning an error."""
     program = folder / name
-    flags = ["-std=c11", "-D_POSIX_C_SOURCE=200809L", "-Wall", "-Wextra", "-Werror", "-O1", "-g", "-pthread"]
+    flags = [
+        "-std=c11",
+        "-D_POSIX_C_SOURCE=200809L",
+        "-Wall",
+        "-Wextra",
+        "-Werror",
+        "-O1",
+        "-g",
+        "-pthread",
+        "-rdynamic",
+    ]
     subprocess.run(["cc", *flags, "-o", program, SOURCES / f"{name}.c", "-ldl"], check=True)
     return program
 
@@ -38,6 +48,8 @@ def drive(program: Path, fmu: Path, *, start: float = 0.0, count: int = 400, und
         arguments = []
         for variable in description.modelVariables:
             reference = variable.valueReference
+            if variable.name == "mode_real" and variable.causality == "input":
+                arguments += ["f", str(reference), "1"]
             if variable.type != "Real" or variable.name.startswith("mode"):
                 continue
             if variable.causality == "input":
@@ -48,6 +60,21 @@ def drive(program: Path, fmu: Path, *, start: float = 0.0, count: int = 400, und
         plan = [description.guid, Path(unpacked, "resources").as_uri(), repr(start), repr(step), str(count)]
         command = [*under, program, library, *plan, *arguments]
         return subprocess.run(command, check=True, stdout=subprocess.PIPE, text=True).stdout
+
+
+def exhaust(program: Path, fmu: Path) -> dict[str, int]:
+    """Lets each allocation of an FMU fail in turn.
+
+    Returns:
+        How many failures each operation met.
+    """
+    with tempfile.TemporaryDirectory() as unpacked:
+        fmpy.extract(fmu, unpacked)
+        (library,) = Path(unpacked, "binaries", "linux64").iterdir()
+        guid = fmpy.read_model_description(unpacked).guid
+        command = [program, library, guid, Path(unpacked, "resources").as_uri()]
+        text = subprocess.run(command, check=True, stdout=subprocess.PIPE, text=True).stdout
+    return {name: int(met) for name, met in map(str.split, text.splitlines())}
 
 
 def connections(sides: dict[str, fmpy.model_description.ModelDescription]) -> list[str]:

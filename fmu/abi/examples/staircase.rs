@@ -5,7 +5,7 @@
 //! [`PANIC`] and [`FAIL`].
 
 use fmu_abi::clock::Event;
-use fmu_abi::{Refusal, Slave, Values, require_finite, resource, selected_mode};
+use fmu_abi::{Readiness, Refusal, Slave, Values, require_finite, resource, selected_mode};
 use model_description::{Causality, Kind, Role, Span, Variability, Variable, VariableTable};
 use serde::{Deserialize, Serialize};
 use std::path::Path;
@@ -32,8 +32,7 @@ pub struct Staircase {
 struct Spans {
     input: Span,
     reference: Span,
-    mode: Span,
-    mode_real: Span,
+    mode: [Span; 2],
     gain: Span,
     start_at_one: Span,
     early: Span,
@@ -47,6 +46,10 @@ struct Spans {
 pub struct State {
     sum: Vec<f64>,
     ticks: u64,
+    /// Number of the first tick that was run.
+    first: u64,
+    /// Ticks that began on inputs of an earlier one.
+    stale: u64,
 }
 
 impl Clone for State {
@@ -60,7 +63,7 @@ impl Clone for State {
     /// Copies in place: on line nothing may be allocated.
     fn clone_from(&mut self, source: &Self) {
         self.sum.clone_from(&source.sum);
-        self.ticks = source.ticks;
+        (self.ticks, self.first, self.stale) = (source.ticks, source.first, source.stale);
     }
 }
 
@@ -75,6 +78,15 @@ pub fn table() -> VariableTable {
         nominal: None,
         min: None,
         max: None,
+        relative: false,
+    };
+    let ranged = Kind::Real {
+        unit: None,
+        display_unit: None,
+        nominal: None,
+        min: Some(-10.0),
+        max: Some(10.0),
+        relative: false,
     };
     let integer = Kind::Integer {
         min: None,
@@ -86,7 +98,7 @@ pub fn table() -> VariableTable {
         ("ref", Role::Reference, &real, Input, Discrete, 0.0),
         ("mode", Role::Mode, &integer, Input, Discrete, 1.0),
         ("mode_real", Role::ModeReal, &real, Input, Discrete, 0.0),
-        ("gain", Role::Threshold, &real, Parameter, Tunable, 1.0),
+        ("gain", Role::Threshold, &ranged, Parameter, Tunable, 1.0),
         (
             "start_at_one",
             Role::ScenarioEnabled,
@@ -127,17 +139,17 @@ pub fn table() -> VariableTable {
 }
 
 impl Staircase {
-    /// The factor of the active mode, which is its number.
-    fn factor(&self, values: &Values) -> Result<f64, Refusal> {
-        let Spans {
-            mode, mode_real, ..
-        } = self.spans;
-        selected_mode(&self.table, values, mode, mode_real, MODES).map(|mode| (mode + 1) as f64)
+    /// The factor of the active mode, which is its number; none while the mode is untold.
+    fn factor(&self, values: &Values) -> Result<Option<f64>, Refusal> {
+        let mode = selected_mode(&self.table, values, self.spans.mode, MODES)?;
+        Ok(mode.map(|mode| (mode + 1) as f64))
     }
 }
 
 impl Slave for Staircase {
     type State = State;
+
+    const RESOURCE: &'static str = RESOURCE;
 
     const PROVIDES_DIRECTIONAL_DERIVATIVE: bool = true;
 
@@ -152,8 +164,7 @@ impl Slave for Staircase {
         let spans = Spans {
             input: table.span(Role::Measurement),
             reference: table.span(Role::Reference),
-            mode: table.span(Role::Mode),
-            mode_real: table.span(Role::ModeReal),
+            mode: [Role::Mode, Role::ModeReal].map(|role| table.span(role)),
             gain: table.span(Role::Threshold),
             start_at_one: table.span(Role::ScenarioEnabled),
             early: table.span(Role::Command),
@@ -180,18 +191,23 @@ impl Slave for Staircase {
         State {
             sum: vec![0.0; 2],
             ticks: 0,
+            first: 0,
+            stale: 0,
         }
     }
 
-    fn check_inputs(&self, values: &Values) -> Result<(), Refusal> {
-        self.factor(values)?;
-        require_finite(&self.table, values, self.spans.reference)
+    fn check_inputs(&self, values: &Values) -> Result<Readiness, Refusal> {
+        require_finite(&self.table, values, self.spans.reference)?;
+        Ok(match self.factor(values)? {
+            Some(_) => Readiness::Complete,
+            None => Readiness::ModeUntold(self.spans.mode[0].first),
+        })
     }
 
     fn initialize(&self, state: &mut State, values: &mut Values) -> Result<(), Refusal> {
         require_finite(&self.table, values, self.spans.reference)?;
         let start = values.scalar(self.spans.start_at_one);
-        state.ticks = 0;
+        (state.ticks, state.stale) = (0, 0);
         state.sum.fill(start + values.scalar(self.spans.reference));
         values.set(self.spans.early, &state.sum);
         values.set(self.spans.late, &state.sum);
@@ -200,7 +216,17 @@ impl Slave for Staircase {
         Ok(())
     }
 
-    fn begin_tick(&self, state: &mut State, values: &mut Values, k: u64) -> Result<(), Refusal> {
+    fn begin_tick(
+        &self,
+        state: &mut State,
+        values: &mut Values,
+        k: u64,
+        fresh: bool,
+    ) -> Result<(), Refusal> {
+        state.stale += u64::from(!fresh);
+        if state.ticks == 0 {
+            state.first = k;
+        }
         let reference = values.scalar(self.spans.reference);
         if reference == PANIC {
             panic!("asked to panic, 100%s");
@@ -208,8 +234,12 @@ impl Slave for Staircase {
         if reference == FAIL {
             return Err("asked to fail".into());
         }
-        assert_eq!(k, state.ticks, "ticks come in order, each once");
-        let factor = self.factor(values)? * values.scalar(self.spans.gain);
+        assert_eq!(
+            k,
+            state.first + state.ticks,
+            "ticks come in order, each once"
+        );
+        let factor = self.factor(values)?.unwrap_or(0.0) * values.scalar(self.spans.gain);
         for (sum, input) in state.sum.iter_mut().zip(values.get(self.spans.input)) {
             // A NaN measurement arrives here as it is; this slave ignores it.
             if input.is_finite() {
@@ -221,7 +251,7 @@ impl Slave for Staircase {
     }
 
     fn end_tick(&self, state: &mut State, values: &mut Values, k: u64) -> Result<(), Refusal> {
-        assert_eq!(k, state.ticks, "a tick ends after it began");
+        assert_eq!(k, state.first + state.ticks, "a tick ends after it began");
         state.ticks += 1;
         values.set(self.spans.late, &state.sum);
         values.set(self.spans.ticks, &[state.ticks as f64]);
@@ -237,7 +267,7 @@ impl Slave for Staircase {
         seed: &Values,
         response: &mut Values,
     ) -> Result<(), Refusal> {
-        let factor = self.factor(values)? * values.scalar(self.spans.gain);
+        let factor = self.factor(values)?.unwrap_or(0.0) * values.scalar(self.spans.gain);
         for span in [self.spans.early, self.spans.late] {
             let changes = seed.get(self.spans.input);
             for (slot, change) in response.get_mut(span).iter_mut().zip(changes) {

@@ -14,28 +14,39 @@
 //! plant) therefore gives the same values at common times whatever the steps: `Te/7`, `Te`,
 //! `3.5 Te`, irregular.
 //!
-//! **No drift.** Time is kept as a whole number of ticks and a remainder of at most half a
-//! tick, and follows the importer's own communication points. Whenever the remainder is no more
-//! than what rounding explains, a millionth of the step just made and a few units in the last
-//! place of the importer's time, the importer meant the tick itself and the remainder is
-//! dropped. So a sum of ten million times 0.1 counts ten million ticks, and a start time of
-//! 1e9 costs no accuracy.
+//! **What is meant.** Importers round: 0.0166667 s for 1/60 s, 0.333 for a third. Time is kept
+//! as a whole number of ticks and a remainder of at most half a tick. Whenever the remainder is
+//! no more than [`MEANT`] of a tick (of the step, if that is longer), or the time since the start
+//! agrees and is that near to the tick, the importer meant the tick itself and the remainder is
+//! dropped. So a step within a thousandth of `Te`, or of a whole multiple or fraction of it, is
+//! taken for it, and ten million of them are as many ticks: nothing adds up. A start time of 1e9
+//! costs no accuracy. Time follows the importer's own communication points.
+//!
+//! **What is late.** Inputs come at communication points only. A tick that begins within a step
+//! runs on inputs from before it began: [`Clock::begins_within`].
 
 use serde::{Deserialize, Serialize};
 
-/// A deviation, relative to a step, that is taken for rounding.
-const ROUNDING: f64 = 1e-6;
+/// A deviation, in units of `Te`, that is taken for rounding.
+pub const MEANT: f64 = 1e-3;
 
-/// The same for the importer's time, in units in the last place.
+/// The most that is taken for rounding in a step of many ticks.
+const MOST_MEANT: f64 = 0.02;
+
+/// How far a communication point may lie from the end of the last step, in units of `Te`.
+const NEAR: f64 = 1e-2;
+
+/// What a double may be off, in units in its last place.
 const LAST_PLACES: f64 = 4.0;
 
-/// No step may run more ticks than this; it would be a mistake of units.
-const MOST_TICKS: f64 = 1e9;
+/// No step runs more ticks than this: it could not be interrupted.
+pub const MOST_TICKS: u64 = 100_000;
 
 /// Where an instance stands in time. Plain data: it is part of a saved state.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Clock {
     sample_time: f64,
+    start: f64,
     stop: Option<f64>,
     /// The last communication point, as the importer counts.
     now: f64,
@@ -64,6 +75,7 @@ impl Clock {
     pub fn new(sample_time: f64) -> Self {
         Self {
             sample_time,
+            start: 0.0,
             stop: None,
             now: 0.0,
             steps: 0,
@@ -86,6 +98,7 @@ impl Clock {
             return Err(format!("stopTime {stop} lies before startTime {start}"));
         }
         *self = Self {
+            start,
             stop,
             now: start,
             wanted: start,
@@ -101,9 +114,10 @@ impl Clock {
 
     /// The clock after a step of length `step` from communication point `from`.
     ///
-    /// The events of the step are then had from [`Clock::next_event`]. Errors: a step that is
-    /// not positive and finite (the standard asks for more than 0), a point that does not
-    /// continue the last, a step beyond the stop time, a step of absurdly many ticks.
+    /// The events of the step are then had from [`Clock::next_event`]. A step of more than
+    /// [`MOST_TICKS`] ticks ends after as many. Errors: a step that is not positive and finite
+    /// (the standard asks for more than 0), a point that does not continue the last, a step
+    /// beyond the stop time.
     pub fn advanced(&self, from: f64, step: f64) -> Result<Self, String> {
         if !(step.is_finite() && step > 0.0) {
             return Err(format!(
@@ -112,7 +126,7 @@ impl Clock {
         }
         let resolution = LAST_PLACES * ulp(from) / self.sample_time;
         let gap = |last: f64| ((from - last) / self.sample_time).abs();
-        let near = 10.0 * ROUNDING + resolution;
+        let near = NEAR + resolution;
         if !(gap(self.now) <= near || gap(self.wanted) <= near) {
             return Err(format!(
                 "currentCommunicationPoint is {from}, but the last step ended at {}",
@@ -126,17 +140,32 @@ impl Clock {
         {
             return Err(format!("the step ends at {to}, after stopTime {stop}"));
         }
+        let most = MOST_TICKS as f64;
         let length = (((from - self.now) + step) / self.sample_time).max(0.0);
-        if length > MOST_TICKS {
-            return Err(format!(
-                "a step of {step} s runs {length:.3e} ticks of {} s, more than {MOST_TICKS:.0e}",
-                self.sample_time
-            ));
-        }
+        let (to, length) = if length > most {
+            (self.now + most * self.sample_time, most)
+        } else {
+            (to, length)
+        };
         let mut next = self.clone();
         (next.now, next.wanted, next.steps) = (to, to, self.steps + 1);
         next.move_on(length, resolution);
         Ok(next)
+    }
+
+    /// The sample time in seconds.
+    pub fn sample_time(&self) -> f64 {
+        self.sample_time
+    }
+
+    /// Whether tick `k` begins after this communication point by more than is taken for rounding.
+    pub fn begins_within(&self, k: u64) -> bool {
+        self.until(k) > MEANT
+    }
+
+    /// From this communication point to the beginning of tick `k`, in units of `Te`.
+    pub fn until(&self, k: u64) -> f64 {
+        (i128::from(k) - i128::from(self.ticks)) as f64 - self.remainder
     }
 
     /// Notes that a step was refused: the importer may repeat it or go on after it.
@@ -149,10 +178,20 @@ impl Clock {
         self.begun < self.ticks + u64::from(self.remainder > self.tolerance())
     }
 
+    /// Whether a tick is to end by now.
+    pub fn ends_tick(&self) -> bool {
+        self.ended < self.complete()
+    }
+
+    /// The ticks that are complete by now.
+    fn complete(&self) -> u64 {
+        let late = u64::from(self.remainder < -self.tolerance());
+        self.ticks.saturating_sub(late)
+    }
+
     /// The next event up to now; `None` when all have happened.
     pub fn next_event(&mut self) -> Option<Event> {
-        let late = u64::from(self.remainder < -self.tolerance());
-        let ended = self.ticks.saturating_sub(late);
+        let ended = self.complete();
         if self.begun == self.ended && self.begins_tick() {
             self.begun += 1;
             Some(Event::Begin(self.begun - 1))
@@ -182,7 +221,9 @@ impl Clock {
     /// be anything.
     pub fn is_sound(&self, sample_time: f64) -> bool {
         const MOST: u64 = 1 << 60;
-        let known = [self.now, self.wanted].iter().all(|time| time.is_finite());
+        let known = [self.start, self.now, self.wanted]
+            .iter()
+            .all(|time| time.is_finite());
         let counts = [self.ticks, self.begun, self.ended, self.steps];
         self.sample_time == sample_time
             && known
@@ -200,15 +241,20 @@ impl Clock {
         self.ticks += whole as u64;
         self.remainder = sum - whole;
         // A step no longer than its own tolerance must not be undone, else time stood still.
-        let explained = (ROUNDING * length + resolution).min(length / 4.0);
-        if self.remainder.abs() <= explained {
+        let whole_step = (MEANT * length.max(1.0)).min(MOST_MEANT);
+        let by_steps = (whole_step + resolution).min(length / 4.0);
+        let by_time = (MEANT + resolution).min(length / 4.0);
+        let elapsed = (self.now - self.start) / self.sample_time - self.ticks as f64;
+        // Steps that were taken for others have left the time since the start behind.
+        let agree = (elapsed - self.remainder).abs() <= 3.0 * MEANT;
+        if self.remainder.abs() <= by_steps || (agree && elapsed.abs() <= by_time) {
             self.remainder = 0.0;
         }
     }
 
     /// A remainder that counts as none, in units of `Te`.
     fn tolerance(&self) -> f64 {
-        (ROUNDING + LAST_PLACES * ulp(self.now) / self.sample_time).min(0.01)
+        (MEANT + LAST_PLACES * ulp(self.now) / self.sample_time).min(0.01)
     }
 }
 

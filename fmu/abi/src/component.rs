@@ -4,14 +4,14 @@
 //! here, and turn a [`Failure`] into a status and a message. No method here unwinds on bad
 //! input, and none allocates on success between fmi2ExitInitializationMode and fmi2Terminate.
 
-use crate::clock::Event;
+use crate::clock::{Clock, Event, MOST_TICKS};
 use crate::life_cycle::{Function, State, States};
 use crate::logger::Logger;
+use crate::memory::{self, Reserve};
 use crate::snapshot::Snapshot;
 use crate::types::{Status, ValueReference};
-use crate::{Refusal, Slave, Values};
-use model_description::{Causality, Kind, Variability, Variable};
-use std::collections::BTreeMap;
+use crate::{Readiness, Refusal, Slave, Values};
+use model_description::{Causality, Kind, Variability, Variable, VariableTable};
 
 /// Why a call did not succeed.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -38,7 +38,15 @@ impl Failure {
             message: message.into(),
         }
     }
+
+    /// No memory for what was asked.
+    pub fn out_of_memory() -> Self {
+        Self::error(OUT_OF_MEMORY)
+    }
 }
+
+/// What the log gets when memory is short.
+pub const OUT_OF_MEMORY: &str = "the system has no memory left; nothing was changed";
 
 impl From<String> for Failure {
     fn from(message: String) -> Self {
@@ -67,21 +75,33 @@ pub enum Base {
 }
 
 /// What may be done with a variable: the table's row, made small for the hot path.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 struct Access {
     base: Base,
     causality: Causality,
     settable: States,
+    /// The range that a parameter must keep to.
+    range: Option<(f64, f64)>,
+    /// Past the last of the variables from here on with the same access, which can be read and
+    /// set at one go.
+    end: u32,
 }
 
 impl Access {
     fn of(variable: &Variable) -> Self {
+        let (base, min, max) = match variable.kind {
+            Kind::Real { min, max, .. } => (Base::Real, min, max),
+            Kind::Integer { min, max } => (Base::Integer, min.map(f64::from), max.map(f64::from)),
+            Kind::Boolean => (Base::Boolean, None, None),
+        };
+        let parameter = variable.causality == Causality::Parameter;
+        let bound = parameter && (min.is_some() || max.is_some());
+        let range = (
+            min.unwrap_or(f64::NEG_INFINITY),
+            max.unwrap_or(f64::INFINITY),
+        );
         Self {
-            base: match variable.kind {
-                Kind::Real { .. } => Base::Real,
-                Kind::Integer { .. } => Base::Integer,
-                Kind::Boolean => Base::Boolean,
-            },
+            base,
             causality: variable.causality,
             // The standard would have inputs set from initialization mode on only; importers
             // set them before it too, and no harm is done.
@@ -90,20 +110,55 @@ impl Access {
                 (Causality::Parameter, Variability::Fixed) => States::BEFORE_START,
                 _ => States::UNTIL_END,
             },
+            range: bound.then_some(range),
+            end: 0,
         }
+    }
+
+    /// The rows of a table.
+    fn all(table: &VariableTable) -> Box<[Self]> {
+        let mut rows: Box<[Self]> = table
+            .iter()
+            .map(|(_, variable)| Self::of(variable))
+            .collect();
+        let mut end = rows.len() as u32;
+        for at in (0..rows.len()).rev() {
+            let next = rows.get(at + 1);
+            if next.is_some_and(|next| Self { end: 0, ..*next } != rows[at]) {
+                end = at as u32 + 1;
+            }
+            rows[at].end = end;
+        }
+        rows
     }
 }
 
+/// What an instance has told the importer, once each; not part of a saved state.
+#[derive(Clone, Copy, Debug, Default)]
+struct Told {
+    late_inputs: bool,
+    notice: bool,
+}
+
+/// A state saved for the importer; its address is the importer's handle.
+type Saved<T> = Box<Snapshot<T>>;
+
 /// One instance.
 pub struct Component<S: Slave> {
-    /// Messages to the importer.
+    /// The way to the importer.
     pub logger: Logger,
+    /// Messages to be handed over once nothing of the instance is borrowed.
+    pub messages: Vec<(Status, String)>,
     slave: S,
     guid: String,
     access: Box<[Access]>,
     current: Snapshot<S::State>,
-    /// States saved for the importer, by their address, which is its handle.
-    saved: BTreeMap<usize, Box<Snapshot<S::State>>>,
+    /// The state after fmi2Instantiate.
+    fresh: Snapshot<S::State>,
+    /// Bytes of memory that a snapshot takes at most.
+    footprint: usize,
+    told: Told,
+    saved: Vec<Saved<S::State>>,
     /// Scratch of directional derivatives.
     trial: S::State,
     seed: Values,
@@ -118,17 +173,18 @@ impl<S: Slave> Component<S> {
             return Err(format!("the sample time is {period}: it must be positive"));
         }
         let start = Values::start(slave.variables());
+        let (footprint, fresh) = memory::size_of_made(|| Snapshot::fresh(&slave));
         Ok(Self {
             logger,
+            messages: Vec::new(),
             guid: guid.to_string(),
-            access: slave
-                .variables()
-                .iter()
-                .map(|(_, v)| Access::of(v))
-                .collect(),
-            current: Snapshot::fresh(&slave),
-            saved: BTreeMap::new(),
-            trial: slave.initial_state(),
+            access: Access::all(slave.variables()),
+            current: fresh.clone(),
+            footprint: footprint + size_of::<Snapshot<S::State>>(),
+            trial: fresh.state.clone(),
+            fresh,
+            told: Told::default(),
+            saved: Vec::new(),
             seed: start.clone(),
             response: start,
             slave,
@@ -171,11 +227,19 @@ impl<S: Slave> Component<S> {
     /// log: masters initialise the FMUs one after the other, and have until the first step.
     pub fn exit_initialization(&mut self) -> Outcome {
         self.refresh()?;
-        if let Err(Refusal(why)) = self.slave.check_inputs(&self.current.values) {
+        let why = match self.slave.check_inputs(&self.current.values) {
+            Ok(Readiness::Complete) => None,
+            Ok(Readiness::ModeUntold(mode)) => Some(format!(
+                "{} is 0, not told yet; outputs rest at the operating point of mode 1 until it is",
+                self.name(mode)
+            )),
+            Err(Refusal(why)) => Some(format!(
+                "{why}; the outputs are provisional until the first step"
+            )),
+        };
+        if let Some(why) = why {
             self.current.provisional = true;
-            let name = Function::ExitInitializationMode.name();
-            let text = format!("{name}: {why}; the outputs are provisional until the first step");
-            self.logger.log(Status::Warning, &text);
+            self.warn(Function::ExitInitializationMode, &why);
         }
         self.enter(State::StepComplete);
         Ok(())
@@ -189,7 +253,8 @@ impl<S: Slave> Component<S> {
 
     /// fmi2Reset: equals a fresh instance; saved states remain valid.
     pub fn reset(&mut self) -> Outcome {
-        self.current = Snapshot::fresh(&self.slave);
+        self.current.clone_from(&self.fresh);
+        self.told = Told::default();
         self.enter(State::Instantiated);
         Ok(())
     }
@@ -203,17 +268,19 @@ impl<S: Slave> Component<S> {
         convert: impl Fn(f64) -> Option<T>,
     ) -> Outcome {
         self.refresh()?;
+        if let Some((first, _)) = self.at_one_go(base, references) {
+            let values = self.current.values.run(first, references.len());
+            for ((slot, &value), &reference) in out.iter_mut().zip(values).zip(references) {
+                *slot = convert(value).ok_or_else(|| self.not_of(base, reference, value))?;
+            }
+            return Ok(());
+        }
         for &reference in references {
             self.access(reference, base)?;
         }
         for (&reference, slot) in references.iter().zip(out) {
             let value = self.current.values.at(reference).unwrap_or_default();
-            *slot = convert(value).ok_or_else(|| {
-                Failure::error(format!(
-                    "{} is {value}, which is no {base:?}",
-                    self.name(reference)
-                ))
-            })?;
+            *slot = convert(value).ok_or_else(|| self.not_of(base, reference, value))?;
         }
         Ok(())
     }
@@ -226,50 +293,168 @@ impl<S: Slave> Component<S> {
         values: &[T],
         convert: impl Fn(T) -> f64,
     ) -> Outcome {
-        for &reference in references {
+        let phase = self.phase();
+        match self.at_one_go(base, references) {
+            Some((first, access)) if access.range.is_none() && access.settable.contain(phase) => {
+                let slots = self.current.values.run_mut(first, references.len());
+                for (slot, &value) in slots.iter_mut().zip(values) {
+                    *slot = convert(value);
+                }
+                self.current.handed_over |= access.causality == Causality::Input;
+            }
+            _ => self.write_each(base, references, values, convert)?,
+        }
+        self.current.stale = phase == State::InitializationMode;
+        Ok(())
+    }
+
+    /// The same for variables that are not all alike, one after the other.
+    fn write_each<T: Copy>(
+        &mut self,
+        base: Base,
+        references: &[ValueReference],
+        values: &[T],
+        convert: impl Fn(T) -> f64,
+    ) -> Outcome {
+        for (&reference, &value) in references.iter().zip(values) {
             let access = self.access(reference, base)?;
             if !access.settable.contain(self.phase()) {
                 return Err(self.not_settable(reference, access));
             }
+            let value = convert(value);
+            if let Some((min, max)) = access.range
+                && !(min..=max).contains(&value)
+            {
+                let name = self.name(reference);
+                return Err(Failure::error(format!(
+                    "{name} is {value}, outside its range from {min} to {max}"
+                )));
+            }
         }
         for (&reference, &value) in references.iter().zip(values) {
+            let access = self.access(reference, base)?;
             if let Some(slot) = self.current.values.slot(reference) {
                 *slot = convert(value);
             }
+            self.current.handed_over |= access.causality == Causality::Input;
         }
-        self.current.stale = self.phase() == State::InitializationMode;
         Ok(())
+    }
+
+    /// The first of variables that lie side by side and are of this type, and what may be done
+    /// with them all.
+    fn at_one_go(
+        &self,
+        base: Base,
+        references: &[ValueReference],
+    ) -> Option<(ValueReference, Access)> {
+        let &first = references.first()?;
+        let access = *self.access.get(first as usize)?;
+        let side_by_side = references
+            .iter()
+            .zip(first..access.end)
+            .all(|(&reference, expected)| reference == expected);
+        let within = references.len() <= (access.end - first) as usize;
+        (access.base == base && within && side_by_side).then_some((first, access))
     }
 
     /// fmi2DoStep: runs the ticks of the step.
     ///
-    /// A step that is refused, by the clock or for its inputs, changes nothing.
+    /// A step that is refused, by the clock or for its inputs, changes nothing. One of too many
+    /// ticks is done in part and then discarded.
     pub fn step(&mut self, from: f64, length: f64) -> Outcome {
-        let current = &mut self.current;
-        let next = current.clock.advanced(from, length)?;
-        if next.begins_tick() {
-            if let Err(refusal) = self.slave.check_inputs(&current.values) {
-                current.clock.refuse(from, length);
-                return Err(refusal.into());
+        let next = self.current.clock.advanced(from, length)?;
+        let before = std::mem::replace(&mut self.current.clock, next);
+        let waits = match self.prepare() {
+            Ok(waits) => waits,
+            Err(failure) => {
+                self.current.clock = before;
+                self.current.clock.refuse(from, length);
+                return Err(failure);
             }
-            if std::mem::take(&mut current.provisional) {
-                let (state, values) = (&mut current.state, &mut current.values);
-                self.slave.initialize(state, values)?;
-            }
+        };
+        let late = self.run_ticks(waits, &before)?;
+        if let Some(k) = late
+            && !std::mem::replace(&mut self.told.late_inputs, true)
+        {
+            let text = late_inputs(&before, k, length);
+            self.warn(Function::DoStep, &text);
         }
-        current.clock = next;
+        if !self.told.notice
+            && let Some(text) = self.slave.notice(&self.current.state)
+        {
+            self.told.notice = true;
+            self.warn(Function::DoStep, text);
+        }
+        let (now, te) = (self.current.clock.now(), before.sample_time());
+        if from + length - now <= 0.5 * te {
+            return Ok(());
+        }
+        self.current.phase = State::StepFailed;
+        Err(Failure::discard(format!(
+            "a step of {length} s runs more than {MOST_TICKS} ticks of {te} s and was done up to \
+             {now} s; make steps of at most {} s",
+            MOST_TICKS as f64 * te
+        )))
+    }
+
+    /// Checks the inputs that the coming ticks read; says whether the mode is still untold.
+    fn prepare(&mut self) -> Result<bool, Failure> {
+        let current = &mut self.current;
+        if current.clock.ends_tick() && !current.provisional {
+            self.slave.check_late_inputs(&current.values)?;
+        }
+        if !current.clock.begins_tick() {
+            return Ok(current.provisional);
+        }
+        match self.slave.check_inputs(&current.values)? {
+            Readiness::Complete => Ok(false),
+            Readiness::ModeUntold(_) if current.provisional => Ok(true),
+            Readiness::ModeUntold(mode) => Err(Failure::error(format!(
+                "{} is 0, which means not told yet, after a mode had been told: the modes are the \
+                 whole numbers from 1 on",
+                self.name(mode)
+            ))),
+        }
+    }
+
+    /// Runs the ticks up to the clock's time; while the slave `waits` for its mode they pass and
+    /// nothing is computed. Returns the first tick that began within the step.
+    fn run_ticks(&mut self, waits: bool, before: &Clock) -> Result<Option<u64>, Failure> {
+        let current = &mut self.current;
+        let mut late = None;
         while let Some(event) = current.clock.next_event() {
+            let fresh = match event {
+                Event::Begin(k) => {
+                    late = late.or_else(|| before.begins_within(k).then_some(k));
+                    std::mem::take(&mut current.handed_over)
+                }
+                Event::End(_) => false,
+            };
+            if waits {
+                continue;
+            }
             let (state, values) = (&mut current.state, &mut current.values);
             let ran = match event {
-                Event::Begin(k) => self.slave.begin_tick(state, values, k),
+                // A tick that passed while the mode was untold has nothing to publish.
+                Event::End(_) if current.provisional => Ok(()),
                 Event::End(k) => self.slave.end_tick(state, values, k),
+                Event::Begin(k) => {
+                    let begun = std::mem::take(&mut current.provisional);
+                    let ready = if begun {
+                        self.slave.initialize(state, values)
+                    } else {
+                        Ok(())
+                    };
+                    ready.and_then(|()| self.slave.begin_tick(state, values, k, fresh))
+                }
             };
             if let Err(refusal) = ran {
                 current.phase = State::Error;
                 return Err(refusal.into());
             }
         }
-        Ok(())
+        Ok(late)
     }
 
     /// The end of the last step that succeeded.
@@ -328,8 +513,12 @@ impl<S: Slave> Component<S> {
             }
         }
         let Snapshot { state, values, .. } = &self.current;
-        if self.current.phase != State::InitializationMode {
-            self.slave.check_inputs(values)?;
+        if self.current.phase != State::InitializationMode
+            && let Readiness::ModeUntold(_) = self.slave.check_inputs(values)?
+        {
+            // At rest until the mode is told: nothing moves the outputs.
+            out.fill(0.0);
+            return Ok(());
         }
         self.trial.clone_from(state);
         if self.current.provisional {
@@ -353,38 +542,50 @@ impl<S: Slave> Component<S> {
     /// fmi2GetFMUstate: saves into the state behind `handle`, or into a new one if it is 0.
     pub fn save(&mut self, handle: usize) -> Result<usize, Failure> {
         if handle == 0 {
-            return Ok(self.keep(self.current.clone()));
+            return self.keep(|it| Ok(it.current.clone()), 0);
         }
-        let saved = self.saved.get_mut(&handle).ok_or_else(unknown_state)?;
-        saved.as_mut().clone_from(&self.current);
+        let at = self.position(handle)?;
+        self.saved[at].as_mut().clone_from(&self.current);
         Ok(handle)
     }
 
     /// fmi2SetFMUstate.
     pub fn restore(&mut self, handle: usize) -> Outcome {
-        let saved = self.saved.get(&handle).ok_or_else(unknown_state)?;
-        self.current.clone_from(saved);
+        let at = self.position(handle)?;
+        self.current.clone_from(&self.saved[at]);
         Ok(())
     }
 
     /// fmi2FreeFMUstate; nothing to do for 0.
     pub fn forget(&mut self, handle: usize) -> Outcome {
-        if handle == 0 || self.saved.remove(&handle).is_some() {
-            Ok(())
-        } else {
-            Err(unknown_state())
+        if handle != 0 {
+            self.saved.swap_remove(self.position(handle)?);
         }
+        Ok(())
     }
 
-    /// fmi2SerializeFMUstate, and the size of its bytes.
-    pub fn serialize(&self, handle: usize) -> Result<Vec<u8>, Failure> {
-        Ok(self.saved(handle)?.to_bytes(&self.guid)?)
+    /// The size of what [`Component::serialize`] writes, in bytes.
+    pub fn serialized_size(&self, handle: usize) -> Result<usize, Failure> {
+        let at = self.position(handle)?;
+        Ok(self.saved[at].size_in_bytes(&self.guid)?)
+    }
+
+    /// fmi2SerializeFMUstate: fills `out`, which must have the right size.
+    pub fn serialize(&self, handle: usize, out: &mut [u8]) -> Outcome {
+        let at = self.position(handle)?;
+        Ok(self.saved[at].write_bytes(&self.guid, out)?)
     }
 
     /// fmi2DeSerializeFMUstate: the handle of a new saved state.
     pub fn deserialize(&mut self, bytes: &[u8]) -> Result<usize, Failure> {
-        let snapshot = Snapshot::from_bytes(bytes, &self.guid, &self.slave)?;
-        Ok(self.keep(snapshot))
+        // A state has fewer bytes than it takes memory; others would be read for nothing.
+        if bytes.len() > 2 * self.footprint + self.guid.len() + 1024 {
+            return Err(Failure::error(
+                "the bytes are too many for a state of this FMU",
+            ));
+        }
+        let read = |it: &Self| Snapshot::from_bytes(bytes, &it.guid, &it.slave).map_err(Into::into);
+        self.keep(read, bytes.len() * READING)
     }
 
     /// Computes the outputs of initialization mode if values were set since.
@@ -405,8 +606,14 @@ impl<S: Slave> Component<S> {
         if self.logger.hears(Status::Ok) {
             let time = self.current.clock.now();
             let message = format!("{} at time {time}", phase.name());
-            self.logger.log(Status::Ok, &message);
+            self.messages.push((Status::Ok, message));
         }
+    }
+
+    /// Leaves a warning for the importer.
+    fn warn(&mut self, function: Function, text: &str) {
+        let message = format!("{}: {text}", function.name());
+        self.messages.push((Status::Warning, message));
     }
 
     /// The access to a variable that must exist and be of this type.
@@ -449,19 +656,59 @@ impl<S: Slave> Component<S> {
         variable.map_or("an unknown variable", |variable| &variable.name)
     }
 
-    fn saved(&self, handle: usize) -> Result<&Snapshot<S::State>, Failure> {
-        let saved = self.saved.get(&handle).ok_or_else(unknown_state)?;
-        Ok(saved)
+    /// Refuses a value that is none of the type asked for.
+    fn not_of(&self, base: Base, reference: ValueReference, value: f64) -> Failure {
+        let name = self.name(reference);
+        Failure::error(format!("{name} is {value}, which is no {base:?}"))
     }
 
-    fn keep(&mut self, snapshot: Snapshot<S::State>) -> usize {
-        let snapshot = Box::new(snapshot);
-        let handle = &raw const *snapshot as usize;
-        self.saved.insert(handle, snapshot);
-        handle
+    /// Where the saved state of this handle lies.
+    fn position(&self, handle: usize) -> Result<usize, Failure> {
+        let known = |saved: &Saved<S::State>| address(saved) == handle;
+        self.saved.iter().position(known).ok_or_else(|| {
+            Failure::error("the FMU state is none that this instance has saved and not freed")
+        })
+    }
+
+    /// Keeps a new snapshot, the making of which may take `more` bytes than the snapshot; not
+    /// if memory is short.
+    fn keep(
+        &mut self,
+        make: impl FnOnce(&Self) -> Result<Snapshot<S::State>, Failure>,
+        more: usize,
+    ) -> Result<usize, Failure> {
+        let mark = memory::mark();
+        let Some(_reserve) = Reserve::take(2 * self.footprint + more) else {
+            return Err(Failure::out_of_memory());
+        };
+        let kept = make(self).map(Box::new);
+        let room = self.saved.try_reserve(1);
+        if memory::short_of_memory(mark) || room.is_err() {
+            // The list may have grown into the reserve.
+            self.saved.shrink_to_fit();
+            return Err(Failure::out_of_memory());
+        }
+        let kept = kept?;
+        let handle = address(&kept);
+        self.saved.push(kept);
+        Ok(handle)
     }
 }
 
-fn unknown_state() -> Failure {
-    Failure::error("the FMU state is none that this instance has saved and not freed")
+/// Bytes of memory that reading one byte of a saved state may take: an empty vector is one byte.
+const READING: usize = 128;
+
+fn address<T>(saved: &Saved<T>) -> usize {
+    &raw const **saved as usize
+}
+
+/// The warning that a tick ran on inputs from before it began.
+fn late_inputs(before: &Clock, k: u64, length: f64) -> String {
+    let te = before.sample_time();
+    let (from, age) = (before.now(), before.until(k) * te);
+    format!(
+        "in the step of {length} s from {from} s a tick began {age} s after the inputs were set, \
+         and ran on these old inputs: the sample time is {te} s, make steps of just that, or of a \
+         whole fraction of it (told once)"
+    )
 }

@@ -1,6 +1,7 @@
 //! The macro that makes the 44 C functions.
 
-/// Exports all functions of FMI 2.0 for a [`crate::Slave`], once in a binary.
+/// Exports all functions of FMI 2.0 for a [`crate::Slave`], once in a binary, and makes
+/// [`crate::memory::Memory`] its allocator.
 ///
 /// ```text
 /// fmu_abi::export_fmu!(Controller);
@@ -12,6 +13,9 @@
 macro_rules! export_fmu {
     ($slave:ty) => {
         const _: () = {
+            #[global_allocator]
+            static MEMORY: $crate::memory::Memory = $crate::memory::Memory;
+
             use $crate::types::*;
             use $crate::life_cycle::Function;
 

@@ -11,9 +11,10 @@
 //! says; strings end with a zero; one instance is used by one thread at a time. Null pointers,
 //! absurd counts and unknown handles are checked and refused.
 
-use crate::component::{Base, Component, Failure, Outcome};
+use crate::component::{Base, Component, Failure, OUT_OF_MEMORY, Outcome};
 use crate::life_cycle::Function;
 use crate::logger::Logger;
+use crate::memory::{self, Reserve};
 use crate::types::*;
 use crate::{Slave, resource};
 use std::any::Any;
@@ -31,10 +32,31 @@ unsafe fn call<S: Slave>(
     function: Function,
     body: impl FnOnce(&mut Component<S>) -> Outcome,
 ) -> Status {
-    // SAFETY: by contract of the function.
-    let Some(component) = (unsafe { c.cast::<Component<S>>().as_mut() }) else {
-        return Status::Error;
+    // SAFETY: by contract of the function; the reference ends before the log is handed over.
+    let (status, logger, messages) = match unsafe { c.cast::<Component<S>>().as_mut() } {
+        None => return Status::Error,
+        Some(component) => {
+            let status = run(component, function, body);
+            if component.messages.is_empty() {
+                return status;
+            }
+            let messages = std::mem::take(&mut component.messages);
+            (status, component.logger.clone(), messages)
+        }
     };
+    // Nothing of the instance is borrowed here: the importer's logger may call the FMU.
+    for (status, message) in &messages {
+        logger.log(*status, message);
+    }
+    status
+}
+
+/// The same; what the log is to get is left with the instance.
+fn run<S: Slave>(
+    component: &mut Component<S>,
+    function: Function,
+    body: impl FnOnce(&mut Component<S>) -> Outcome,
+) -> Status {
     let phase = component.phase();
     let ran = if function.allowed().contain(phase) {
         catch_unwind(AssertUnwindSafe(|| body(component)))
@@ -51,7 +73,7 @@ unsafe fn call<S: Slave>(
         }
     };
     let text = format!("{}: {message}", function.name());
-    component.logger.log(status, &text);
+    component.messages.push((status, text));
     status
 }
 
@@ -182,17 +204,29 @@ pub unsafe fn instantiate<S: Slave>(
         let name = name.unwrap_or(c"unnamed");
         Logger::new(functions.logger, environment, name, logging_on != 0)
     };
+    let mark = memory::mark();
     let make = || component::<S>(name, kind, guid, location, logger());
     let made = catch_unwind(AssertUnwindSafe(make))
         .unwrap_or_else(|panic| Err(format!("a defect of this FMU: {}", panic_text(&*panic))));
+    let made = match made {
+        Ok(_) if memory::short_of_memory(mark) => Err(OUT_OF_MEMORY.into()),
+        made => made,
+    };
     match made {
-        Ok(component) => Box::into_raw(Box::new(component)).cast(),
+        Ok((component, _reserve)) => Box::into_raw(component).cast(),
         Err(message) => {
-            logger().log_always(Status::Error, &format!("fmi2Instantiate: {message}"));
+            logger().log(Status::Error, &format!("fmi2Instantiate: {message}"));
             std::ptr::null_mut()
         }
     }
 }
+
+/// Bytes of memory that instantiating may take for each byte of the resource: a number takes
+/// two at least, and becomes eight in a vector that grows by doubling, in a model and in states.
+const LOADING: usize = 64;
+
+/// An instance, and the reserve it was made with, to be kept until it is handed out.
+type Made<S> = (Box<Component<S>>, Reserve);
 
 fn component<S: Slave>(
     name: Option<&CStr>,
@@ -200,7 +234,7 @@ fn component<S: Slave>(
     guid: Option<&CStr>,
     location: Option<&CStr>,
     logger: Logger,
-) -> Result<Component<S>, String> {
+) -> Result<Made<S>, String> {
     let text = |what: &str, text: Option<&CStr>| {
         let text = text.ok_or_else(|| format!("{what} is a null pointer"))?;
         let text = text.to_str().map_err(|_| format!("{what} is not UTF-8"))?;
@@ -214,7 +248,10 @@ fn component<S: Slave>(
     }
     let guid = text("fmuGUID", guid)?;
     let folder = resource::folder(&text("fmuResourceLocation", location)?)?;
-    Component::new(S::load(&folder, &guid)?, &guid, logger)
+    let size = resource::size(&folder.join(S::RESOURCE))? as usize;
+    let reserve = Reserve::take(memory::SMALL + LOADING * size).ok_or(OUT_OF_MEMORY)?;
+    let component = Component::new(S::load(&folder, &guid)?, &guid, logger)?;
+    Ok((Box::new(component), reserve))
 }
 
 /// `fmi2FreeInstance`; a null pointer is ignored.
@@ -249,7 +286,11 @@ pub unsafe fn set_debug_logging<S: Slave>(
             // SAFETY: by contract of the function.
             unsafe { string(*text) }.ok_or_else(|| Failure::error("a category is a null pointer"))
         });
+        let mark = memory::mark();
         let categories: Vec<&CStr> = strings.collect::<Result<_, _>>()?;
+        if memory::short_of_memory(mark) {
+            return Err(Failure::out_of_memory());
+        }
         Ok(component.logger.switch(on != 0, &categories)?)
     };
     // SAFETY: by contract of the function.
@@ -563,7 +604,7 @@ pub unsafe fn serialized_fmu_state_size<S: Slave>(
     size: *mut usize,
 ) -> Status {
     let body = |component: &mut Component<S>| {
-        let length = component.serialize(state as usize)?.len();
+        let length = component.serialized_size(state as usize)?;
         // SAFETY: by contract of the function.
         unsafe { put("size", size, length) }
     };
@@ -583,8 +624,8 @@ pub unsafe fn serialize_fmu_state<S: Slave>(
     size: usize,
 ) -> Status {
     let body = |component: &mut Component<S>| {
-        let serialized = component.serialize(state as usize)?;
-        let needed = serialized.len();
+        // The size is checked before anything is written through the pointer.
+        let needed = component.serialized_size(state as usize)?;
         if size != needed {
             return Err(Failure::error(format!(
                 "size is {size}, but the state has {needed} bytes"
@@ -592,8 +633,7 @@ pub unsafe fn serialize_fmu_state<S: Slave>(
         }
         // SAFETY: by contract of the function.
         let out = unsafe { array_mut("serializedState", bytes.cast::<u8>(), size, needed) }?;
-        out.copy_from_slice(&serialized);
-        Ok(())
+        component.serialize(state as usize, out)
     };
     // SAFETY: by contract of the function.
     unsafe { call(c, Function::SerializeFMUstate, body) }

@@ -14,7 +14,8 @@
 //! | module | what it decides |
 //! |---|---|
 //! | [`types`] | the C types |
-//! | [`exported`] | pointers, counts, panics: the only unsafe code |
+//! | [`exported`] | pointers, counts, panics: with `memory` the only unsafe code |
+//! | [`memory`] | what happens when memory runs out |
 //! | [`life_cycle`] | which function may be called when: the standard's table |
 //! | [`component`] | what each function does to an instance, in safe code |
 //! | [`clock`] | which ticks a communication step runs |
@@ -33,11 +34,12 @@ mod export;
 pub mod exported;
 pub mod life_cycle;
 pub mod logger;
+pub mod memory;
 pub mod resource;
 mod slave;
 pub mod snapshot;
 pub mod types;
 mod values;
 
-pub use slave::{Refusal, Slave, nearest_mode, require_finite, selected_mode};
+pub use slave::{Readiness, Refusal, Slave, nearest_mode, require_finite, selected_mode};
 pub use values::Values;

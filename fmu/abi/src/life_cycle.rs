@@ -14,7 +14,7 @@ pub enum State {
     StepComplete = 1 << 2,
     /// A step runs in the background; never reached, steps are synchronous.
     StepInProgress = 1 << 3,
-    /// A step was done in part; never reached, steps are done whole or not at all.
+    /// A step was done in part, since it was too long to be done at once.
     StepFailed = 1 << 4,
     /// A background step was cancelled; never reached.
     StepCanceled = 1 << 5,
@@ -29,10 +29,7 @@ pub enum State {
 impl State {
     /// Whether an instance can be saved in this state, and ever is in it.
     pub fn is_savable(self) -> bool {
-        let reached = !matches!(
-            self,
-            Self::StepInProgress | Self::StepFailed | Self::StepCanceled
-        );
+        let reached = !matches!(self, Self::StepInProgress | Self::StepCanceled);
         reached && Function::GetFMUstate.allowed().contain(self)
     }
 

@@ -3,19 +3,25 @@
 use crate::types::{LoggerCallback, Pointer, Status};
 use model_description::LOG_CATEGORIES;
 use std::ffi::{CStr, CString};
+use std::sync::Arc;
 
 /// Position of `logAll`, which stands for every category.
 const ALL: usize = LOG_CATEGORIES.len() - 1;
 
 /// The importer's logger, and which categories it wants to hear.
 ///
-/// Silent when off. The text handed over is finished: it holds no `%`, which the importer's
-/// `printf` would interpret, and `#`, the standard's mark for value references, is doubled.
-#[derive(Debug)]
+/// Warnings, refusals and errors are always handed over: `loggingOn` and the categories switch
+/// events alone. Many importers leave logging off and would else show a status without its
+/// sentence. The text handed over is finished: it holds no `%`, which the importer's `printf`
+/// would interpret, and `#`, the standard's mark for value references, is doubled.
+///
+/// A copy is cheap and allocates nothing: the importer may call the FMU from its logger, so
+/// messages are handed over when nothing of the instance is borrowed.
+#[derive(Clone, Debug)]
 pub struct Logger {
     callback: Option<LoggerCallback>,
     environment: Pointer,
-    instance_name: CString,
+    instance_name: Arc<CStr>,
     enabled: [bool; LOG_CATEGORIES.len()],
 }
 
@@ -30,7 +36,7 @@ impl Logger {
         Self {
             callback,
             environment,
-            instance_name: instance_name.to_owned(),
+            instance_name: instance_name.into(),
             enabled: [on; LOG_CATEGORIES.len()],
         }
     }
@@ -57,19 +63,15 @@ impl Logger {
 
     /// Whether a message of this status would be heard.
     pub fn hears(&self, status: Status) -> bool {
-        self.callback.is_some() && self.enabled.get(category(status)).is_some_and(|on| *on)
+        let switched = || self.enabled.get(category(status)).is_some_and(|on| *on);
+        self.callback.is_some() && (status != Status::Ok || switched())
     }
 
-    /// Hands over a message if its category is on.
+    /// Hands over a message if it is to be heard.
     pub fn log(&self, status: Status, message: &str) {
-        if self.hears(status) {
-            self.log_always(status, message);
+        if !self.hears(status) {
+            return;
         }
-    }
-
-    /// Hands over a message whatever is switched: the standard wants the reason of a failed
-    /// fmi2Instantiate to be told, and no category can have been switched on before it.
-    pub fn log_always(&self, status: Status, message: &str) {
         let Some(callback) = self.callback else {
             return;
         };

@@ -4,6 +4,12 @@ use percent_encoding::percent_decode_str;
 use std::fs;
 use std::path::{Path, PathBuf};
 
+/// The host that a URI may name in front of a local path, in any case, and the slash after it.
+const LOCAL_HOST: &str = "//localhost/";
+
+/// The greatest resource that is read, in bytes: far more than a design has.
+pub const MOST_BYTES: u64 = 1 << 28;
+
 /// The folder behind `fmuResourceLocation`, as importers really write it.
 ///
 /// `file:///tmp/a%20b`, `file:/tmp/a b`, `file:////tmp`, `file://localhost/tmp`, a plain path,
@@ -32,6 +38,7 @@ pub fn read_verified(
     guid: &str,
 ) -> Result<Vec<u8>, String> {
     let path = resources.join(file);
+    size(&path)?;
     let bytes =
         fs::read(&path).map_err(|error| format!("cannot read {}: {error}", path.display()))?;
     let found = model_description::guid(identifier, &bytes);
@@ -44,6 +51,23 @@ pub fn read_verified(
             path.display()
         ))
     }
+}
+
+/// The size of a resource in bytes; only a file of no absurd size is one.
+pub fn size(path: &Path) -> Result<u64, String> {
+    let found =
+        fs::metadata(path).map_err(|error| format!("cannot read {}: {error}", path.display()))?;
+    if !found.is_file() {
+        return Err(format!("{} is no file", path.display()));
+    }
+    if found.len() > MOST_BYTES {
+        return Err(format!(
+            "{} has {} bytes, more than the {MOST_BYTES} that are read",
+            path.display(),
+            found.len()
+        ));
+    }
+    Ok(found.len())
 }
 
 /// The path in a file URI, or the location itself if it is a path.
@@ -60,10 +84,11 @@ fn path_part(location: &str) -> Result<&str, String> {
             "fmuResourceLocation {location} is no file URI: unpack the FMU to a local folder"
         ));
     }
-    let path = rest.strip_prefix("//localhost/").map_or(rest, |path| {
-        // Keep the slash that makes the path absolute.
-        &rest[rest.len() - path.len() - 1..]
-    });
+    // The slash that makes the path absolute is kept.
+    let path = match rest.get(..LOCAL_HOST.len()) {
+        Some(host) if host.eq_ignore_ascii_case(LOCAL_HOST) => &rest[LOCAL_HOST.len() - 1..],
+        _ => rest,
+    };
     if path.is_empty() {
         return Err("fmuResourceLocation names no folder".into());
     }
@@ -102,6 +127,8 @@ mod tests {
             "file:////tmp/a b/resources",
             "FILE:///tmp/a b/resources",
             "file://localhost/tmp/a%20b/resources",
+            "file://LocalHost/tmp/a b/resources",
+            "FILE://LOCALHOST/tmp/a b/resources",
             "/tmp/a b/resources",
         ] {
             assert_eq!(on(false, location), "/tmp/a b/resources", "{location}");

@@ -30,6 +30,15 @@ impl From<&str> for Refusal {
     }
 }
 
+/// Whether inputs that make sense are complete.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Readiness {
+    /// They are.
+    Complete,
+    /// The mode, whose value reference this is, has not been told: it and its twin are 0.
+    ModeUntold(u32),
+}
+
 /// A sampled system behind the FMI 2.0 co-simulation interface.
 ///
 /// # On line
@@ -37,6 +46,9 @@ impl From<&str> for Refusal {
 /// Between [`Slave::initialize`] and the end of the run nothing may allocate: scratch memory
 /// belongs into `State`, sized by [`Slave::initial_state`].
 pub trait Slave: Sized + 'static {
+    /// The file in the `resources` folder that [`Slave::load`] reads.
+    const RESOURCE: &'static str;
+
     /// Everything that changes at run time, including scratch that a later tick reads.
     /// Its `clone_from` must copy in place: states are saved and tried between two ticks.
     type State: Clone + Serialize + DeserializeOwned + 'static;
@@ -62,11 +74,12 @@ pub trait Slave: Sized + 'static {
     /// Called again whenever values were set in initialization mode, so only the last call
     /// before the first tick counts. An input whose source may not be initialised yet, such as
     /// a mode that still reads 0, is taken as best it can be: while [`Slave::check_inputs`]
-    /// refuses it, all this is provisional and done once more when the first tick begins.
-    /// A refusal changes nothing.
+    /// refuses it or finds no mode, all this is provisional, no tick of the slave is run, and
+    /// it is done once more when the first one begins. A refusal changes nothing.
     fn initialize(&self, state: &mut Self::State, values: &mut Values) -> Result<(), Refusal>;
 
-    /// Tick `k` begins: time goes beyond `k Te`. Inputs are sampled here.
+    /// Tick `k` begins: time goes beyond `k Te`. Inputs are sampled here; they are not `fresh`
+    /// if none was set since another tick began, as in a step of many ticks.
     ///
     /// A controller computes and publishes here; a plant latches its inputs and computes, and
     /// publishes in [`Slave::end_tick`]. An error leaves the instance in the error state, from
@@ -77,6 +90,7 @@ pub trait Slave: Sized + 'static {
         state: &mut Self::State,
         values: &mut Values,
         k: u64,
+        fresh: bool,
     ) -> Result<(), Refusal>;
 
     /// Tick `k` ends: time has reached `(k + 1) Te`.
@@ -93,8 +107,19 @@ pub trait Slave: Sized + 'static {
     ///
     /// A refusal is fmi2Error and nothing else happens: outputs keep their last values, no tick
     /// is run, and the importer may repeat the step or go on.
-    fn check_inputs(&self, _values: &Values) -> Result<(), Refusal> {
+    fn check_inputs(&self, _values: &Values) -> Result<Readiness, Refusal> {
+        Ok(Readiness::Complete)
+    }
+
+    /// The same for the inputs that [`Slave::end_tick`] reads, asked before a step in which a
+    /// tick ends.
+    fn check_late_inputs(&self, _values: &Values) -> Result<(), Refusal> {
         Ok(())
+    }
+
+    /// What the importer should know of the run so far, besides its outputs; told once.
+    fn notice(&self, _state: &Self::State) -> Option<&'static str> {
+        None
     }
 
     /// Whether [`Slave::directional_derivative`] is available.
@@ -128,38 +153,48 @@ pub trait Slave: Sized + 'static {
 
 /// The active mode, counted from 0, from its Integer variable and its Real twin.
 ///
-/// The Real wins when it is connected, that is, not 0. Errors name the variable and its value.
+/// Either may be 0, which means that it is not connected, or not told yet; where both are,
+/// there is no mode, unless there is but one. Errors name the variables and their values.
 pub fn selected_mode(
     table: &VariableTable,
     values: &Values,
-    integer: Span,
-    real: Span,
+    [integer, real]: [Span; 2],
     modes: usize,
-) -> Result<usize, Refusal> {
-    let (span, value) = mode_number(values, integer, real);
-    if value.fract() == 0.0 && value >= 1.0 && value <= modes as f64 {
-        Ok(value as usize - 1)
-    } else {
-        let name = name(table, span.first);
-        Err(Refusal(format!(
-            "{name} is {value}, but the modes are the whole numbers from 1 to {modes}"
-        )))
+) -> Result<Option<usize>, Refusal> {
+    let numbers = [integer, real].map(|span| values.scalar(span));
+    let (span, number) = match numbers {
+        [0.0, 0.0] => return Ok((modes == 1).then_some(0)),
+        [number, 0.0] => (integer, number),
+        [0.0, number] => (real, number),
+        [number, twin] if number == twin => (integer, number),
+        [number, twin] => {
+            let names = [integer, real].map(|span| name(table, span.first));
+            return Err(Refusal(format!(
+                "{} is {number}, but {} is {twin}: connect one of them and leave the other at 0, \
+                 or let them agree",
+                names[0], names[1]
+            )));
+        }
+    };
+    if number.fract() == 0.0 && number >= 1.0 && number <= modes as f64 {
+        return Ok(Some(number as usize - 1));
     }
+    let name = name(table, span.first);
+    Err(Refusal(format!(
+        "{name} is {number}, but the modes are the whole numbers from 1 to {modes}"
+    )))
 }
 
 /// The mode nearest to the number given, counted from 0: where to start while the mode's source
 /// is not initialised.
-pub fn nearest_mode(values: &Values, integer: Span, real: Span, modes: usize) -> usize {
-    let (_, number) = mode_number(values, integer, real);
+pub fn nearest_mode(values: &Values, [integer, real]: [Span; 2], modes: usize) -> usize {
+    let twin = values.scalar(real);
+    let number = if twin == 0.0 {
+        values.scalar(integer)
+    } else {
+        twin
+    };
     (number.clamp(1.0, modes.max(1) as f64) as usize).saturating_sub(1)
-}
-
-/// The variable that counts, and its value.
-fn mode_number(values: &Values, integer: Span, real: Span) -> (Span, f64) {
-    match values.scalar(real) {
-        0.0 => (integer, values.scalar(integer)),
-        twin => (real, twin),
-    }
 }
 
 /// Refuses a vector with an element that is NaN or infinite, and names the element.

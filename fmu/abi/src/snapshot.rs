@@ -3,10 +3,11 @@
 use crate::clock::{Clock, Event};
 use crate::life_cycle::State;
 use crate::{Slave, Values};
+use postcard::ser_flavors;
 use serde::{Deserialize, Serialize, de::DeserializeOwned};
 
 /// Marks serialised states, with the version of their layout.
-const MARK: [u8; 8] = *b"FTCFMU\0\x02";
+const MARK: [u8; 8] = *b"FTCFMU\0\x03";
 
 /// Length of the checksum at the end.
 const CHECKSUM: usize = size_of::<u32>();
@@ -25,6 +26,8 @@ pub struct Snapshot<T> {
     /// Whether an input could not be worked with yet at fmi2ExitInitializationMode: the first
     /// tick initializes once more.
     pub provisional: bool,
+    /// Whether an input was set since the last tick began.
+    pub handed_over: bool,
     /// Time.
     pub clock: Clock,
     /// Values of all variables.
@@ -47,6 +50,7 @@ impl<T: Clone> Clone for Snapshot<T> {
     fn clone_from(&mut self, source: &Self) {
         (self.phase, self.set_up) = (source.phase, source.set_up);
         (self.stale, self.provisional) = (source.stale, source.provisional);
+        self.handed_over = source.handed_over;
         self.clock.clone_from(&source.clock);
         self.values.clone_from(&source.values);
         self.state.clone_from(&source.state);
@@ -67,25 +71,41 @@ impl<T> Snapshot<T> {
             set_up: false,
             stale: true,
             provisional: false,
+            handed_over: false,
             clock: Clock::new(slave.sample_time()),
             values: Values::start(slave.variables()),
             state: slave.initial_state(),
         }
     }
 
-    /// Bytes without pointers: a mark with a version, the FMU's `guid`, the state, a checksum.
-    pub fn to_bytes(&self, guid: &str) -> Result<Vec<u8>, String>
+    /// Writes bytes without pointers into `out`, which must have just the size they need: a mark
+    /// with a version, the FMU's `guid`, the state, a checksum. Allocates nothing.
+    pub fn write_bytes(&self, guid: &str, out: &mut [u8]) -> Result<(), String>
     where
         T: Serialize,
     {
-        let mut bytes = postcard::to_extend(&(guid, self), MARK.to_vec())
-            .map_err(|error| format!("the state cannot be serialised: {error}"))?;
-        let checksum = crc32fast::hash(&bytes);
-        bytes.extend(checksum.to_le_bytes());
-        Ok(bytes)
+        let end = out.len().saturating_sub(CHECKSUM);
+        let (body, checksum) = out.split_at_mut(end);
+        let Some((mark, content)) = body.split_at_mut_checked(MARK.len()) else {
+            return Err("there is no room for the state".into());
+        };
+        mark.copy_from_slice(&MARK);
+        postcard::to_slice(&(guid, self), content).map_err(not_serialised)?;
+        checksum.copy_from_slice(&crc32fast::hash(body).to_le_bytes());
+        Ok(())
     }
 
-    /// Reads what [`Snapshot::to_bytes`] wrote; refuses damaged and foreign bytes.
+    /// The size of these bytes.
+    pub fn size_in_bytes(&self, guid: &str) -> Result<usize, String>
+    where
+        T: Serialize,
+    {
+        let content = ser_flavors::Size::default();
+        let size = postcard::serialize_with_flavor(&(guid, self), content);
+        Ok(MARK.len() + size.map_err(not_serialised)? + CHECKSUM)
+    }
+
+    /// Reads what [`Snapshot::write_bytes`] wrote; refuses damaged and foreign bytes.
     pub fn from_bytes<S: Slave<State = T>>(
         bytes: &[u8],
         guid: &str,
@@ -118,4 +138,8 @@ impl<T> Snapshot<T> {
             Err("the bytes hold no state that this FMU can be in".into())
         }
     }
+}
+
+fn not_serialised(error: postcard::Error) -> String {
+    format!("the state cannot be serialised: {error}")
 }

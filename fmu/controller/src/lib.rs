@@ -5,7 +5,9 @@
 //! that steps the controller before the plant adds no delay to the loop.
 
 use fmu_abi::clock::Event;
-use fmu_abi::{Refusal, Slave, Values, nearest_mode, require_finite, resource, selected_mode};
+use fmu_abi::{
+    Readiness, Refusal, Slave, Values, nearest_mode, require_finite, resource, selected_mode,
+};
 use ftc_control::{Change, Compensate, Controller, ControllerState, Sample};
 use model_description::{CONTROLLER, DESIGN_FILE, Interface, Role, Span, VariableTable};
 use std::path::Path;
@@ -26,8 +28,8 @@ pub struct ControllerFmu {
 struct Spans {
     measurement: Span,
     reference: Span,
-    mode: Span,
-    mode_real: Span,
+    /// The Integer and its Real twin.
+    mode: [Span; 2],
     ftc_enabled: Span,
     threshold: Span,
     command: Span,
@@ -35,6 +37,7 @@ struct Spans {
     fault_estimate: Span,
     residual: Span,
     fault_flag: Span,
+    fault_real: Span,
 }
 
 impl Spans {
@@ -42,8 +45,7 @@ impl Spans {
         Self {
             measurement: table.span(Role::Measurement),
             reference: table.span(Role::Reference),
-            mode: table.span(Role::Mode),
-            mode_real: table.span(Role::ModeReal),
+            mode: [Role::Mode, Role::ModeReal].map(|role| table.span(role)),
             ftc_enabled: table.span(Role::FtcEnabled),
             threshold: table.span(Role::Threshold),
             command: table.span(Role::Command),
@@ -51,6 +53,7 @@ impl Spans {
             fault_estimate: table.span(Role::FaultEstimate),
             residual: table.span(Role::Residual),
             fault_flag: table.span(Role::FaultFlag),
+            fault_real: table.span(Role::FaultFlagReal),
         }
     }
 }
@@ -58,8 +61,7 @@ impl Spans {
 impl ControllerFmu {
     /// The active mode (0-based); the nearest, where the inputs have not passed their check.
     fn mode(&self, values: &Values) -> usize {
-        let (mode, twin) = (self.spans.mode, self.spans.mode_real);
-        nearest_mode(values, mode, twin, self.at_rest.len())
+        nearest_mode(values, self.spans.mode, self.at_rest.len())
     }
 
     /// Refuses references and thresholds that are no finite numbers.
@@ -89,18 +91,19 @@ impl ControllerFmu {
         values.set(spans.state_estimate, &state.observer.estimate);
         values.set(spans.fault_estimate, &state.estimator.fault);
         values.set(spans.residual, &state.estimator.residual);
-        for (slot, &flagged) in values
-            .get_mut(spans.fault_flag)
-            .iter_mut()
-            .zip(&state.estimator.flagged)
-        {
-            *slot = f64::from(u8::from(flagged));
+        for span in [spans.fault_flag, spans.fault_real] {
+            let slots = values.get_mut(span).iter_mut();
+            for (slot, &flagged) in slots.zip(&state.estimator.flagged) {
+                *slot = f64::from(u8::from(flagged));
+            }
         }
     }
 }
 
 impl Slave for ControllerFmu {
     type State = ControllerState;
+
+    const RESOURCE: &'static str = DESIGN_FILE;
 
     fn load(resources: &Path, guid: &str) -> Result<Self, String> {
         let bytes = resource::read_verified(resources, DESIGN_FILE, CONTROLLER, guid)?;
@@ -139,10 +142,13 @@ impl Slave for ControllerFmu {
         Ok(())
     }
 
-    fn check_inputs(&self, values: &Values) -> Result<(), Refusal> {
+    fn check_inputs(&self, values: &Values) -> Result<Readiness, Refusal> {
         self.require_numbers(values)?;
-        let (mode, twin) = (self.spans.mode, self.spans.mode_real);
-        selected_mode(&self.table, values, mode, twin, self.at_rest.len()).map(drop)
+        let mode = self.spans.mode;
+        let selected = selected_mode(&self.table, values, mode, self.at_rest.len())?;
+        Ok(selected.map_or(Readiness::ModeUntold(mode[0].first), |_| {
+            Readiness::Complete
+        }))
     }
 
     fn begin_tick(
@@ -150,7 +156,11 @@ impl Slave for ControllerFmu {
         state: &mut ControllerState,
         values: &mut Values,
         k: u64,
+        fresh: bool,
     ) -> Result<(), Refusal> {
+        if !fresh {
+            self.controller.hold_readings(state);
+        }
         self.controller.tick(state, &self.sample(values, k));
         self.publish(state, values);
         Ok(())

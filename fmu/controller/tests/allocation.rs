@@ -4,11 +4,8 @@
 
 use fmu_host::model::example;
 use fmu_host::types::Status;
-use fmu_host::{Counting, Instance, Model, assert_nothing_is_allocated};
+use fmu_host::{Instance, Model, assert_nothing_is_allocated};
 use ftc_controller_fmu as _;
-
-#[global_allocator]
-static COUNTING: Counting = Counting;
 
 #[test]
 fn nothing_is_allocated_on_line() {

@@ -80,7 +80,7 @@ fn run<S: Slave>(identifier: &str, bytes: &[u8]) {
         return;
     }
     for k in 0..5 {
-        if slave.begin_tick(&mut state, &mut values, k).is_err()
+        if slave.begin_tick(&mut state, &mut values, k, k % 2 == 0).is_err()
             || slave.end_tick(&mut state, &mut values, k).is_err()
         {
             return;

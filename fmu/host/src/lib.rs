@@ -4,7 +4,6 @@
 //! It fails loudly: whatever must succeed is asserted.
 
 mod closed_loop;
-mod counting;
 mod exercise;
 mod functions;
 mod instance;
@@ -12,8 +11,8 @@ pub mod model;
 pub mod random_calls;
 
 pub use closed_loop::{Coupling, Loop};
-pub use counting::{Counting, allocations};
 pub use exercise::{assert_nothing_is_allocated, exercise};
+pub use fmu_abi::memory::allocations;
 pub use fmu_abi::types;
 pub use functions::{Functions, Library};
 pub use instance::{Instance, Messages};

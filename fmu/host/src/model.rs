@@ -77,6 +77,7 @@ pub fn example() -> Design {
             inputs: signals("u"),
             outputs: signals("y"),
             states: signals("x"),
+            disturbances: Vec::new(),
         },
         scenario: common::scenario(common::reference("square"), 0.005, 1),
         controller,

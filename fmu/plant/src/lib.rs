@@ -6,7 +6,9 @@
 //! faults, disturbance and noise.
 
 use fmu_abi::clock::Event;
-use fmu_abi::{Refusal, Slave, Values, nearest_mode, require_finite, resource, selected_mode};
+use fmu_abi::{
+    Readiness, Refusal, Slave, Values, nearest_mode, require_finite, resource, selected_mode,
+};
 use ftc_simulate::integrate::Stalled;
 use ftc_simulate::plant::{Change, External};
 use ftc_simulate::{PlantSimulator, PlantState};
@@ -28,8 +30,8 @@ struct Spans {
     command: Span,
     external_fault: Span,
     external_disturbance: Span,
-    external_mode: Span,
-    external_mode_real: Span,
+    /// The Integer and its Real twin.
+    external_mode: [Span; 2],
     measurement: Span,
     true_output: Span,
     state: Span,
@@ -48,8 +50,8 @@ impl Spans {
             command: table.span(Role::Command),
             external_fault: table.span(Role::ExternalFault),
             external_disturbance: table.span(Role::ExternalDisturbance),
-            external_mode: table.span(Role::ExternalMode),
-            external_mode_real: table.span(Role::ExternalModeReal),
+            external_mode: [Role::ExternalMode, Role::ExternalModeReal]
+                .map(|role| table.span(role)),
             measurement: table.span(Role::Measurement),
             true_output: table.span(Role::TrueOutput),
             state: table.span(Role::State),
@@ -69,9 +71,8 @@ impl PlantFmu {
     /// have not passed their check.
     fn external_mode(&self, values: &Values) -> Option<usize> {
         let spans = &self.spans;
-        let (mode, twin) = (spans.external_mode, spans.external_mode_real);
         let plays = values.flag(spans.scenario_enabled);
-        (!plays).then(|| nearest_mode(values, mode, twin, self.at_rest.len()))
+        (!plays).then(|| nearest_mode(values, spans.external_mode, self.at_rest.len()))
     }
 
     fn external<'a>(&self, values: &'a Values) -> External<'a> {
@@ -107,6 +108,8 @@ impl PlantFmu {
 
 impl Slave for PlantFmu {
     type State = PlantState;
+
+    const RESOURCE: &'static str = DESIGN_FILE;
 
     fn load(resources: &Path, guid: &str) -> Result<Self, String> {
         let bytes = resource::read_verified(resources, DESIGN_FILE, PLANT, guid)?;
@@ -146,14 +149,22 @@ impl Slave for PlantFmu {
         Ok(())
     }
 
-    fn check_inputs(&self, values: &Values) -> Result<(), Refusal> {
+    fn check_inputs(&self, values: &Values) -> Result<Readiness, Refusal> {
         self.require_numbers(values)?;
         let spans = &self.spans;
         if values.flag(spans.scenario_enabled) {
-            return Ok(());
+            return Ok(Readiness::Complete);
         }
-        let (mode, twin) = (spans.external_mode, spans.external_mode_real);
-        selected_mode(&self.table, values, mode, twin, self.at_rest.len()).map(drop)
+        let mode = spans.external_mode;
+        let selected = selected_mode(&self.table, values, mode, self.at_rest.len())?;
+        Ok(selected.map_or(Readiness::ModeUntold(mode[0].first), |_| {
+            Readiness::Complete
+        }))
+    }
+
+    /// The disturbance and the mode reach the outputs without delay.
+    fn check_late_inputs(&self, values: &Values) -> Result<(), Refusal> {
+        self.check_inputs(values).map(drop)
     }
 
     fn begin_tick(
@@ -161,6 +172,7 @@ impl Slave for PlantFmu {
         state: &mut PlantState,
         values: &mut Values,
         _k: u64,
+        _fresh: bool,
     ) -> Result<(), Refusal> {
         self.simulator.observe(state, &self.external(values));
         let command = values.get(self.spans.command);

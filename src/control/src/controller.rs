@@ -76,6 +76,10 @@ pub struct ControllerState {
     acting: Vec<f64>,
     /// Deviation scratch (n or m).
     deviation: Vec<f64>,
+    /// What bumpless transfer adds to the command (m).
+    offset: Vec<f64>,
+    /// Samples since the offset was last set.
+    since: u32,
     /// What saturation took off the command (m).
     excess: Vec<f64>,
     /// What stands in for a measurement that is not a number (p).
@@ -87,10 +91,10 @@ pub struct ControllerState {
 crate::state!(ControllerState {
     parts: [
         repetition, observer, open_loop, estimator, integral, additive, command, corrected, acting,
-        deviation, excess, substitute, no_fault
+        deviation, offset, excess, substitute, no_fault
     ],
     constants: [],
-    counters: [mode]
+    counters: [mode, since]
 });
 
 impl Controller {
@@ -134,10 +138,18 @@ impl Controller {
             corrected: point.y.clone(),
             acting: point.u.clone(),
             deviation: vec![0.0; dims.states.max(dims.inputs)],
+            offset: vec![0.0; dims.inputs],
+            since: u32::MAX,
             excess: vec![0.0; dims.inputs],
             substitute: vec![0.0; dims.outputs],
             no_fault: vec![0.0; dims.outputs],
         }
+    }
+
+    /// Before a tick: its readings are held ones, since nobody read the sensors anew; that they
+    /// repeat accuses nobody.
+    pub fn hold_readings(&self, state: &mut ControllerState) {
+        state.repetition.hold();
     }
 
     /// One tick: takes the sample and leaves the command in `state.command`.
@@ -172,8 +184,11 @@ impl Controller {
             mode,
             &state.corrected,
         );
-        if left != mode && self.parameters.feedback.bumpless {
-            self.transfer(state, mode, point, sample.reference);
+        if let Some(transfer) = self.parameters.feedback.transfer {
+            state.since = state.since.saturating_add(1);
+            if left != mode && state.since as usize >= transfer.samples {
+                self.transfer(state, mode, point, sample.reference);
+            }
         }
         self.command(state, mode, point, sample);
         self.advance(state, model, mode, sample);
@@ -236,7 +251,7 @@ impl Controller {
         kernel::bound(&mut state.corrected);
     }
 
-    /// Moves the integral part so that the mode just entered repeats the last command.
+    /// Sets the offset so that the mode just entered repeats the last command.
     fn transfer(
         &self,
         state: &mut ControllerState,
@@ -248,14 +263,15 @@ impl Controller {
             return;
         };
         kernel::copy(&mut state.excess, &state.command);
-        kernel::copy(&mut state.acting, &state.command);
-        self.feedback(state, gains, point, reference);
-        for (jump, &new) in state.excess.iter_mut().zip(&state.command) {
-            *jump -= new;
+        if self.parameters.feedback.latency > 0 {
+            kernel::copy(&mut state.acting, &state.command);
         }
-        kernel::add_product(&mut state.integral, &gains.integral_inverse, &state.excess);
-        kernel::bound(&mut state.integral);
-        kernel::copy(&mut state.command, &state.acting);
+        state.offset.fill(0.0);
+        self.feedback(state, gains, point, reference);
+        kernel::difference(&mut state.offset, &state.excess, &state.command);
+        kernel::bound(&mut state.offset);
+        kernel::copy(&mut state.command, &state.excess);
+        state.since = 0;
     }
 
     /// The command of this sample, compensated and clamped to the input's limits.
@@ -296,7 +312,7 @@ impl Controller {
         );
     }
 
-    /// `u = u0 + K (x_hat - x0) + G Z + N (y_ref - S y0) + V (u_prev - u0)`.
+    /// `u = u0 + K (x_hat - x0) + G Z + N (y_ref - S y0) + V (u_prev - u0) + offset`.
     fn feedback(
         &self,
         state: &mut ControllerState,
@@ -315,6 +331,7 @@ impl Controller {
         kernel::add_product(&mut state.command, &gains.feedforward, &state.deviation);
         kernel::difference(&mut state.deviation, &state.acting, &point.u);
         kernel::add_product(&mut state.command, &gains.previous_input, &state.deviation);
+        kernel::add_scaled(&mut state.command, 1.0, &state.offset);
     }
 
     /// Moves observer, integrator and input history to the next sample.
@@ -350,6 +367,11 @@ impl Controller {
                 gains,
                 &state.excess,
             );
+        }
+        if let Some(transfer) = feedback.transfer {
+            for offset in &mut state.offset {
+                *offset = kernel::bounded(transfer.decay * *offset);
+            }
         }
         state.estimator.remember(&state.acting);
     }

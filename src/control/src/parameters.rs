@@ -39,6 +39,15 @@ impl Limits {
     }
 }
 
+/// Bumpless transfer: at a switch an offset lets the command repeat its last value.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Transfer {
+    /// Samples that must have passed since the offset was last set before a switch sets it again.
+    pub samples: usize,
+    /// What is left of the offset after a sample.
+    pub decay: f64,
+}
+
 /// State feedback with integral action, one gain set per mode (20).
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct StateFeedback {
@@ -49,9 +58,9 @@ pub struct StateFeedback {
     /// Angle per sample, in radians, of each resonator of the internal model; usually none.
     #[serde(default)]
     pub resonators: Vec<f64>,
-    /// Whether a mode switch leaves the command where it was, by moving the integral part.
+    /// How a mode switch leaves the command where it was; none: the command may jump.
     #[serde(default)]
-    pub bumpless: bool,
+    pub transfer: Option<Transfer>,
     /// Gains per mode.
     pub modes: Vec<FeedbackGains>,
 }
@@ -88,9 +97,6 @@ pub struct FeedbackGains {
     /// Back-calculation gain (q x m): how a saturated command unwinds the integrator.
     #[serde(with = "rows")]
     pub anti_windup: DMatrix<f64>,
-    /// `G_i^+` (q x m): what the integral must move by for a step of the command.
-    #[serde(with = "rows")]
-    pub integral_inverse: DMatrix<f64>,
     /// `K_i C_i^+` (m x p): what a fault does to the command at once, in the printed control (37).
     #[serde(with = "rows")]
     pub output_feedback: DMatrix<f64>,

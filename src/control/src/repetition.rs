@@ -18,12 +18,14 @@ pub struct Repetition {
     repeats: Vec<u32>,
     /// The readings, infinite where a sensor is silent or frozen (p).
     screened: Vec<f64>,
+    /// Whether the coming readings are held ones, whose repetition means nothing.
+    held: bool,
 }
 
 crate::state!(Repetition {
     parts: [last, repeats, screened],
     constants: [],
-    counters: []
+    counters: [held]
 });
 
 impl Repetition {
@@ -33,12 +35,14 @@ impl Repetition {
             last: vec![SILENCE; outputs],
             repeats: vec![0; outputs],
             screened: vec![SILENCE; outputs],
+            held: false,
         }
     }
 
     /// Takes a sample's readings (p); one repeated `limit` times in a row is none. A `limit` of zero
     /// lets everything through.
     pub fn screen(&mut self, readings: &[f64], limit: u32) -> &[f64] {
+        let held = std::mem::take(&mut self.held);
         let seen = self.last.iter_mut().zip(&mut self.repeats);
         for (((last, repeats), out), &given) in seen.zip(&mut self.screened).zip(readings) {
             let reading = if is_measurement(given) {
@@ -47,16 +51,21 @@ impl Repetition {
                 SILENCE
             };
             let repeated = reading == *last;
-            *repeats = if repeated {
-                repeats.saturating_add(1)
-            } else {
-                0
+            *repeats = match (repeated, held) {
+                (true, true) => *repeats,
+                (true, false) => repeats.saturating_add(1),
+                (false, _) => 0,
             };
             *last = reading;
             let frozen = limit > 0 && *repeats >= limit;
             *out = if frozen { SILENCE } else { reading };
         }
         &self.screened
+    }
+
+    /// Says that the coming readings are the last ones, held because nobody read the sensors anew.
+    pub fn hold(&mut self) {
+        self.held = true;
     }
 
     /// The readings of the last sample (p), infinite where a sensor is silent or frozen.
@@ -82,6 +91,18 @@ mod tests {
         let readings = [1.0, 2.0, 2.0, 2.0, 2.0, 3.0, 3.0];
         let expected = [false, false, false, true, true, false, false];
         assert_eq!(silent(&readings, 2), expected);
+    }
+
+    #[test]
+    fn held_readings_accuse_nobody() {
+        let mut repetition = Repetition::new(1);
+        for k in 0..100 {
+            if k % 10 > 0 {
+                repetition.hold();
+            }
+            let reading = f64::from(k / 10);
+            assert_eq!(repetition.screen(&[reading], 2), [reading]);
+        }
     }
 
     #[test]

@@ -6,9 +6,10 @@ use super::{
     ControlSpec, Design, DesignError, FORMAT, ObserverSpec, Run, Signal, Signals,
     check_controllable, synthesise_with,
 };
+use crate::running_loop::{TRANSFER_DECAY, TransferCertificate};
 use ftc_control::ControllerParameters;
 use ftc_control::parameters::{
-    Compensation, Estimator, EstimatorMethod, Harmonics, Limits, Predictor, StateFeedback,
+    Compensation, Estimator, EstimatorMethod, Harmonics, Limits, Predictor, StateFeedback, Transfer,
 };
 use ftc_plant::scaling::Scaling;
 use ftc_plant::{Dimensions, Mode, SwitchedPlant};
@@ -108,7 +109,7 @@ impl KnownDisturbance {
 const SMALLEST_THRESHOLD: f64 = 1e-3;
 
 /// Leverage beyond which the residual is not trusted.
-const LEVERAGE_LIMIT: f64 = 100.0;
+pub(crate) const LEVERAGE_LIMIT: f64 = 100.0;
 
 /// A threshold opens by so much more than the largest known response to the disturbance before that
 /// is learned. While least squares learns, what is left of any such response stays below `1 / ROOM` of
@@ -158,18 +159,27 @@ pub fn assemble_with(request: Request, run: &Run) -> Result<Design, DesignError>
     let estimator = estimator(&request, dims).map_err(DesignError::Request)?;
     let scaling = scaling(&request.signals);
     check_controllable(&request.plant, &request.control, &scaling).map_err(DesignError::Request)?;
-    let synthesis = synthesise_with(
-        &request.plant,
-        &request.control,
-        &request.observer,
-        &scaling,
-        run,
-    )?;
+    let observer = ObserverSpec {
+        noise: observer_noise(&request),
+        ..request.observer.clone()
+    };
+    let mut synthesis =
+        synthesise_with(&request.plant, &request.control, &observer, &scaling, run)?;
+    if request.bumpless
+        && request.plant.modes.len() > 1
+        && !synthesis.certify_transfer(&request.plant)
+    {
+        return Err(DesignError::Request(
+            "controller.bumpless = true cannot be proved for this design: set it to false, ask for another decay, or for \
+             lyapunov = \"dwell\""
+                .into(),
+        ));
+    }
     let input_limits = limits(&request.signals.inputs);
     let feedback = feedback(
         &synthesis.state_feedback,
         &request.plant,
-        request.bumpless,
+        synthesis.running_loop.transfer.as_ref(),
         request.feedforward,
         &input_limits,
     );
@@ -189,6 +199,19 @@ pub fn assemble_with(request: Request, run: &Run) -> Result<Design, DesignError>
         scenario: request.scenario,
         synthesis: Some(synthesis),
     })
+}
+
+/// The sensors' noise as the observer is designed for it: that of the scenario, and of a sensor without
+/// any a thousandth of its nominal value; empty where none is given.
+fn observer_noise(request: &Request) -> Vec<f64> {
+    let given = &request.scenario.noise;
+    if !request.observer.noise.is_empty() || given.iter().all(|&noise| noise == 0.0) {
+        return request.observer.noise.clone();
+    }
+    let outputs = given.iter().zip(&request.signals.outputs);
+    outputs
+        .map(|(noise, output)| noise.max(SMALLEST_THRESHOLD * output.nominal))
+        .collect()
 }
 
 /// The nominal values of the signals.
@@ -214,12 +237,15 @@ fn limits(inputs: &[Signal]) -> Vec<Limits> {
 pub fn feedback(
     control: &super::StateFeedback,
     plant: &SwitchedPlant,
-    bumpless: bool,
+    transfer: Option<&TransferCertificate>,
     feedforward: bool,
     limits: &[Limits],
 ) -> StateFeedback {
     let mut feedback = control.for_controller(plant);
-    feedback.bumpless = bumpless;
+    feedback.transfer = transfer.map(|proved| Transfer {
+        samples: proved.samples,
+        decay: TRANSFER_DECAY,
+    });
     if feedforward {
         let found = super::feedforward::feedforward(plant, control);
         for (gains, gain) in feedback.modes.iter_mut().zip(found) {
@@ -272,7 +298,7 @@ fn estimator(request: &Request, dims: Dimensions) -> Result<Estimator, String> {
         debounce: spec.debounce,
         stuck_after: spec.stuck_after,
         leverage_limit: LEVERAGE_LIMIT,
-        largest_fault: outputs.iter().map(largest_fault).collect(),
+        largest_fault: largest_faults(outputs),
     })
 }
 
@@ -415,6 +441,11 @@ fn known_harmonics(
             .unwrap_or(UNKNOWN_VARIANCE)
             .clamp(1.0, UNKNOWN_VARIANCE),
     }
+}
+
+/// The largest estimate of each sensor's fault (p).
+pub(crate) fn largest_faults(outputs: &[Signal]) -> Vec<f64> {
+    outputs.iter().map(largest_fault).collect()
 }
 
 fn largest_fault(output: &Signal) -> f64 {

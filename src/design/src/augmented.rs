@@ -42,17 +42,39 @@ pub struct AugmentedMode {
     pub d: DMatrix<f64>,
 }
 
+/// Whether no disturbance is known (`E = 0` and `F = 0` in every mode): a design then assumes one that
+/// acts where the inputs do, so that the weights have something to weigh.
+pub fn assumes_input_disturbance(plant: &SwitchedPlant) -> bool {
+    let known = |mode: &Mode| mode.e.amax() > 0.0 || mode.f.amax() > 0.0;
+    !plant.modes.iter().any(known)
+}
+
+/// The disturbance a mode is designed for: `E` (n x s) and `F` (p x s) as given, else `B` and zero.
+pub fn design_disturbance(plant: &SwitchedPlant, mode: usize) -> (DMatrix<f64>, DMatrix<f64>) {
+    let own = &plant.modes[mode];
+    match assumes_input_disturbance(plant) {
+        true => (own.b.clone(), DMatrix::zeros(own.c.nrows(), own.b.ncols())),
+        false => (own.e.clone(), own.f.clone()),
+    }
+}
+
 /// The augmented model of every mode. Each entry is one product of given numbers (and exact powers
 /// of two), so it carries at most one rounding.
 pub fn augment(plant: &SwitchedPlant, spec: &ControlSpec, units: &Units) -> Vec<AugmentedMode> {
-    let modes = plant.modes.iter();
-    modes
-        .map(|mode| augment_mode(mode, plant.sample_time, spec, units))
+    (0..plant.modes.len())
+        .map(|mode| augment_mode(plant, mode, spec, units))
         .collect()
 }
 
-fn augment_mode(mode: &Mode, sample_time: f64, spec: &ControlSpec, units: &Units) -> AugmentedMode {
-    let (n, m, s) = (mode.a.nrows(), mode.b.ncols(), mode.e.ncols());
+fn augment_mode(
+    plant: &SwitchedPlant,
+    index: usize,
+    spec: &ControlSpec,
+    units: &Units,
+) -> AugmentedMode {
+    let (mode, sample_time) = (&plant.modes[index], plant.sample_time);
+    let (given_e, given_f) = design_disturbance(plant, index);
+    let (n, m, s) = (mode.a.nrows(), mode.b.ncols(), given_e.ncols());
     let r = spec.tracked.len();
     let previous = spec.latency * m;
     let (first_z, q) = (n + previous, spec.integral_size());
@@ -76,12 +98,12 @@ fn augment_mode(mode: &Mode, sample_time: f64, spec: &ControlSpec, units: &Units
     }
     let all_disturbances = vec![units.disturbance; s];
     e.view_mut((0, 0), (n, s))
-        .copy_from(&scaled(&mode.e, &units.states, &all_disturbances));
+        .copy_from(&scaled(&given_e, &units.states, &all_disturbances));
 
     for (row, &output) in spec.tracked.iter().enumerate() {
         for k in 0..n {
-            let c = mode.c[(output, k)] * units.states[k];
-            h[(row, k)] = spec.output_weight[row] * (c / units.performance);
+            let c = mode.c[(output, k)] * (units.states[k] / units.performance);
+            h[(row, k)] = spec.output_weight[row] * c;
         }
     }
     for (index, of) in integral_states(spec).iter().enumerate() {
@@ -94,11 +116,11 @@ fn augment_mode(mode: &Mode, sample_time: f64, spec: &ControlSpec, units: &Units
         if of.driven {
             reference[(z, of.row)] = sample_time / unit;
             for k in 0..n {
-                let c = mode.c[(output, k)] * units.states[k];
-                a[(z, k)] = -sample_time * (c / unit);
+                let c = mode.c[(output, k)] * (units.states[k] / unit);
+                a[(z, k)] = -sample_time * c;
             }
             for k in 0..s {
-                e[(z, k)] = -sample_time * (mode.f[(output, k)] * units.disturbance / unit);
+                e[(z, k)] = -sample_time * (given_f[(output, k)] * (units.disturbance / unit));
             }
         }
         h[(r + index, z)] = spec.integral_weight[of.row] * (unit / units.performance);
@@ -149,9 +171,24 @@ fn integral_states(spec: &ControlSpec) -> Vec<IntegralState> {
     states
 }
 
-/// `rows^-1 matrix columns`; exact when the units are powers of two.
+/// What a reading (p) adds to the augmented state (d x p): `-Te` where it drives an integrator.
+pub(crate) fn readings(plant: &SwitchedPlant, spec: &ControlSpec, units: &Units) -> DMatrix<f64> {
+    let dims = plant.dimensions();
+    let first_z = dims.states + spec.latency * dims.inputs;
+    let mut matrix = DMatrix::zeros(first_z + spec.integral_size(), dims.outputs);
+    for (index, of) in integral_states(spec).iter().enumerate() {
+        if of.driven {
+            let output = spec.tracked[of.row];
+            let ratio = units.outputs[output] / units.integrators[of.row];
+            matrix[(first_z + index, output)] = -plant.sample_time * ratio;
+        }
+    }
+    matrix
+}
+
+/// `rows^-1 matrix columns`; when the units are powers of two, exact but for underflow.
 pub(crate) fn scaled(matrix: &DMatrix<f64>, rows: &[f64], columns: &[f64]) -> DMatrix<f64> {
     DMatrix::from_fn(matrix.nrows(), matrix.ncols(), |r, c| {
-        matrix[(r, c)] / rows[r] * columns[c]
+        matrix[(r, c)] * (columns[c] / rows[r])
     })
 }

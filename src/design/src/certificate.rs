@@ -20,7 +20,7 @@ use super::augmented::{AugmentedMode, augment, scaled};
 use super::lyapunov::all_pairs;
 use super::observer::{self, ObserverDesign, corrected_error};
 use super::state_feedback::{ModeGains, StateFeedback};
-use super::units::power_of_two;
+use super::units::is_unit;
 use super::verdict::{BlockKind, BlockName};
 use super::{ControlSpec, DwellTime, Lyapunov, Units};
 use ftc_control::parameters::{Gain, ObserverKind};
@@ -99,7 +99,7 @@ struct ClosedLoop {
 
 impl ClosedLoop {
     fn new(model: AugmentedMode, gain: DMatrix<f64>) -> Self {
-        let gain = Enclosure::exact(gain);
+        let gain = Enclosure::rounded(gain);
         let [a, b, e, h, d] = [model.a, model.b, model.e, model.h, model.d].map(Enclosure::rounded);
         Self {
             a: &a + &(&b * &gain),
@@ -121,7 +121,7 @@ impl FactoredLyapunov {
 }
 
 /// A Lyapunov matrix as the proof uses it: any regular `X` will do, `X = L^-1` up to rounding is best.
-struct Coordinates {
+pub(crate) struct Coordinates {
     /// `X`.
     outward: Enclosure,
     /// `L`.
@@ -133,7 +133,7 @@ struct Coordinates {
 }
 
 impl Coordinates {
-    fn new(lyapunov: &FactoredLyapunov) -> Option<Self> {
+    pub(crate) fn new(lyapunov: &FactoredLyapunov) -> Option<Self> {
         let outward = Enclosure::exact(lyapunov.basis.clone().try_inverse()?);
         let basis = Enclosure::exact(lyapunov.basis.clone());
         let core = Enclosure::exact(lyapunov.core.clone());
@@ -151,8 +151,18 @@ impl Coordinates {
     }
 
     /// `matrix S X'` for a matrix that multiplies the state.
-    fn after(&self, matrix: &Enclosure) -> Enclosure {
+    pub(crate) fn after(&self, matrix: &Enclosure) -> Enclosure {
         &(matrix * &self.basis) * &self.right
+    }
+
+    /// `X matrix` for a matrix that yields a state.
+    pub(crate) fn seen(&self, matrix: &Enclosure) -> Enclosure {
+        &self.outward * matrix
+    }
+
+    /// `X S X'`.
+    pub(crate) fn whole(&self) -> &Enclosure {
+        &self.whole
     }
 
     /// `X S_other X'` of another Lyapunov matrix.
@@ -462,7 +472,7 @@ fn check_observer_sizes(
     let mut units = certificate.states.iter().chain(&certificate.outputs);
     let units_fit = certificate.states.len() == n
         && certificate.outputs.len() == p
-        && units.all(|&unit| power_of_two(unit) == unit);
+        && units.all(|&unit| is_unit(unit));
     let dwell_fits = design.dwell.is_some() == (design.spec.lyapunov == Lyapunov::Dwell);
     require(&[
         (
@@ -481,7 +491,10 @@ fn check_observer_sizes(
             dwell_fits,
             "a dwell time belongs to the dwell guarantee, and to it only",
         ),
-        (units_fit, "the units are not one power of two per signal"),
+        (
+            units_fit,
+            "the units are not one power of two per signal, of moderate size",
+        ),
     ])
 }
 
@@ -532,7 +545,7 @@ fn check_sizes(plant: &SwitchedPlant, design: &StateFeedback) -> Result<(), Cert
         ),
         (
             certificate.units.fit(plant, r),
-            "the units are not one power of two per signal",
+            "the units are not one power of two per signal, of moderate size",
         ),
     ])
 }

@@ -11,6 +11,8 @@ pub mod certificate;
 pub mod commissioning;
 mod controllability;
 #[cfg(feature = "solver")]
+pub mod coverage;
+#[cfg(feature = "solver")]
 mod feedforward;
 pub mod harmonics;
 #[cfg(feature = "solver")]
@@ -21,6 +23,7 @@ mod lyapunov;
 pub mod observer;
 mod record;
 pub(crate) mod riccati;
+pub mod running_loop;
 #[cfg(feature = "solver")]
 mod solver;
 mod spec;
@@ -41,6 +44,7 @@ pub use controllability::check_controllable;
 pub use lyapunov::{DwellTime, Lyapunov};
 pub use observer::{LostCertificate, ObserverCertificate, ObserverDesign};
 pub use record::{Design, FORMAT, Signal, Signals};
+pub use running_loop::{LostSensors, RunningLoop, SwitchingGain};
 #[cfg(feature = "solver")]
 pub use solver::{Run, Solver, Step};
 pub use spec::{ControlSpec, Objective, ObserverChoice, ObserverSpec};
@@ -58,6 +62,8 @@ pub struct Synthesis {
     pub state_feedback: StateFeedback,
     /// The observer (11)-(17).
     pub observer: ObserverDesign,
+    /// What is proved of both together, as the controller runs them.
+    pub running_loop: RunningLoop,
 }
 
 impl Synthesis {
@@ -67,7 +73,16 @@ impl Synthesis {
     /// The first inequality that cannot be proved, or what does not fit.
     pub fn verify(&self, plant: &SwitchedPlant) -> Result<(), CertificateError> {
         self.state_feedback.verify(plant)?;
-        self.observer.verify(plant)
+        self.observer.verify(plant)?;
+        let (control, observer) = (&self.state_feedback, &self.observer);
+        self.running_loop.verify(plant, control, observer)
+    }
+
+    /// Proves bumpless transfer of the loop as well; `false` where no proof is found.
+    #[cfg(feature = "solver")]
+    pub fn certify_transfer(&mut self, plant: &SwitchedPlant) -> bool {
+        let (control, observer) = (&self.state_feedback, &self.observer);
+        self.running_loop.certify_transfer(plant, control, observer)
     }
 }
 
@@ -86,7 +101,8 @@ pub fn synthesise(
     synthesise_with(plant, control, observer, scaling, &Run::default())
 }
 
-/// [`synthesise`] with a chosen solver and someone who watches.
+/// [`synthesise`] with a chosen solver and someone who watches. That there is no observer is said only
+/// after another scaling has confirmed it.
 ///
 /// # Errors
 /// As [`synthesise`]; [`DesignError::Partial`] where one of the two was found.
@@ -98,18 +114,24 @@ pub fn synthesise_with(
     scaling: &Scaling,
     run: &Run,
 ) -> Result<Synthesis, DesignError> {
-    let feedback = state_feedback::synthesise_with(plant, control, scaling, run);
-    let observer = observer::synthesise(plant, observer, scaling);
-    match (feedback, observer) {
-        (Ok(state_feedback), Ok(observer)) => Ok(Synthesis {
-            state_feedback,
-            observer: observer::with_lost_sensors(plant, observer, observer::USUAL_RATIO),
-        }),
-        (Err(error @ DesignError::Request(_)), _) | (_, Err(error @ DesignError::Request(_))) => {
-            Err(error)
+    let state_feedback = match state_feedback::synthesise_with(plant, control, scaling, run) {
+        Ok(found) => found,
+        Err(error @ DesignError::Request(_)) => return Err(error),
+        Err(error) => {
+            let observer = observer::synthesise(plant, observer, scaling);
+            return Err(error.with_parts(None, observer.ok()));
         }
-        (Err(error), observer) => Err(error.with_parts(None, observer.ok())),
-        (Ok(feedback), Err(error)) => Err(error.with_parts(Some(feedback), None)),
+    };
+    let choose = |scaling: &Scaling| running_loop::choose(plant, &state_feedback, observer, scaling);
+    let chosen = choose(scaling);
+    match chosen.or_else(|error| choose(&units::other_scaling(plant, scaling)).or(Err(error))) {
+        Ok((observer, running_loop)) => Ok(Synthesis {
+            state_feedback,
+            observer,
+            running_loop,
+        }),
+        Err(error @ DesignError::Request(_)) => Err(error),
+        Err(error) => Err(error.with_parts(Some(state_feedback), None)),
     }
 }
 

@@ -5,6 +5,7 @@
 //! A Luenberger observer is the same with `H = 0`, `T = I`; a Kalman filter in correction form the
 //! same with `K = 0` and one `H_j` whatever mode was left.
 
+mod detectable;
 #[cfg(feature = "solver")]
 mod existence;
 #[cfg(feature = "solver")]
@@ -15,6 +16,11 @@ mod lost_synthesis;
 #[cfg(feature = "solver")]
 mod synthesis;
 
+pub(crate) use detectable::check_detectable;
+#[cfg(feature = "solver")]
+pub(crate) use existence::check_decoupling;
+#[cfg(feature = "solver")]
+pub(crate) use lost::gains_fit as lost_gains_fit;
 pub use lost::{LostCertificate, MOST_FOR_PAIRS, sets};
 pub(crate) use lost::{corrected_error, verify as verify_lost};
 
@@ -23,7 +29,7 @@ use existence::PerUnit;
 #[cfg(feature = "solver")]
 pub use synthesis::synthesise;
 #[cfg(feature = "solver")]
-pub(crate) use synthesis::{USUAL_RATIO, candidates, with_lost_sensors};
+pub(crate) use synthesis::{Candidate, candidates, with_lost_sensors};
 
 use super::certificate::{self, CertificateError, LyapunovMatrix};
 use super::{DwellTime, ObserverSpec};

@@ -40,6 +40,9 @@ pub struct Signals {
     pub outputs: Vec<Signal>,
     /// States (n).
     pub states: Vec<Signal>,
+    /// Disturbances (s), or none where they are not described.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub disturbances: Vec<Signal>,
 }
 
 /// One signal.

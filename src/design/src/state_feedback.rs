@@ -95,23 +95,23 @@ impl StateFeedback {
     /// an FMU only multiplies and adds and gives the same bits on every machine. The anti-windup
     /// gain is `G^+`: the integral is pulled back to where the clamped command would have come from.
     pub fn for_controller(&self, plant: &SwitchedPlant) -> parameters::StateFeedback {
-        let modes = self.modes.iter().zip(&plant.modes).map(|(gains, mode)| {
-            let integral_inverse = pseudo_inverse(&gains.integral, 1e-12);
-            FeedbackGains {
+        let modes = self
+            .modes
+            .iter()
+            .zip(&plant.modes)
+            .map(|(gains, mode)| FeedbackGains {
                 state_feedback: gains.state_feedback.clone(),
                 integral: gains.integral.clone(),
                 feedforward: DMatrix::zeros(gains.integral.nrows(), 0),
                 previous_input: gains.previous_input.clone(),
-                anti_windup: integral_inverse.clone(),
-                integral_inverse,
+                anti_windup: pseudo_inverse(&gains.integral, 1e-12),
                 output_feedback: &gains.state_feedback * pseudo_inverse(&mode.c, 1e-12),
-            }
-        });
+            });
         parameters::StateFeedback {
             tracked: self.spec.tracked.clone(),
             latency: self.spec.latency,
             resonators: self.spec.resonators.clone(),
-            bumpless: false,
+            transfer: None,
             modes: modes.collect(),
         }
     }

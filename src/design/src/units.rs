@@ -81,9 +81,9 @@ impl Units {
         ];
         let mut all = sizes.iter().flat_map(|(units, _)| units.iter());
         sizes.iter().all(|(units, size)| units.len() == *size)
-            && all.all(|&unit| power_of_two(unit) == unit)
-            && power_of_two(self.disturbance) == self.disturbance
-            && power_of_two(self.performance) == self.performance
+            && all.all(|&unit| is_unit(unit))
+            && is_unit(self.disturbance)
+            && is_unit(self.performance)
     }
 }
 
@@ -103,6 +103,16 @@ pub(crate) fn other_scaling(plant: &SwitchedPlant, used: &Scaling) -> Scaling {
     }
     balanced
 }
+
+/// Whether a number can be a unit: a power of two, far from where scaling by it could overflow, or
+/// underflow and hide a number.
+pub(crate) fn is_unit(unit: f64) -> bool {
+    let largest = libm::ldexp(1.0, LARGEST_EXPONENT);
+    (1.0 / largest..=largest).contains(&unit) && power_of_two(unit) == unit
+}
+
+/// Units lie between `2^-LARGEST_EXPONENT` and `2^LARGEST_EXPONENT`.
+const LARGEST_EXPONENT: i32 = 200;
 
 /// The power of two nearest a positive number on the logarithmic scale; 1 for anything that has
 /// none.

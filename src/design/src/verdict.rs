@@ -16,6 +16,14 @@ pub enum BlockKind {
     ObserverDecay,
     /// The Lyapunov functions of two modes differ by at most the factor mu.
     LyapunovRatio,
+    /// The disturbance reaches the performance signal of the running loop attenuated to its gain.
+    RunningLoop,
+    /// Sensor noise reaches the true tracking error of the running loop with at most its gain.
+    NoiseGain,
+    /// Bumpless transfer keeps the loop stable.
+    Transfer,
+    /// A fault that is not noticed reaches the true tracking error with at most its gain.
+    FaultGain,
     /// The Lyapunov matrix itself is positive definite.
     Lyapunov,
     /// A theorem as the paper prints it.
@@ -51,6 +59,10 @@ impl fmt::Display for BlockName {
             BlockKind::Attenuation => "attenuation",
             BlockKind::ObserverDecay => "observer decay",
             BlockKind::LyapunovRatio => "Lyapunov ratio",
+            BlockKind::RunningLoop => "gamma_loop",
+            BlockKind::NoiseGain => "noise gain",
+            BlockKind::Transfer => "bumpless transfer",
+            BlockKind::FaultGain => "fault gain",
             BlockKind::Lyapunov => "Lyapunov matrix",
             BlockKind::Printed => "printed inequality",
         };

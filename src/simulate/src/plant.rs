@@ -179,7 +179,7 @@ impl PlantSimulator {
             .zip(&scenario.disturbance)
             .zip(external.disturbance)
         {
-            *out = value(signal) + added;
+            *out = kernel::bounded(value(signal) + added);
         }
         for ((out, signal), &added) in state
             .fault
@@ -192,6 +192,7 @@ impl PlantSimulator {
         self.draw_noise(state, external.noise);
         kernel::affine(&mut state.y_true, &offsets.output, &mode.c, &state.x);
         kernel::add_product(&mut state.y_true, &mode.f, &state.disturbance);
+        kernel::bound(&mut state.y_true);
         self.read_sensors(state, built_in);
     }
 
@@ -274,12 +275,12 @@ impl PlantSimulator {
                 reading = event.reading(reading, *last, tick, te);
                 struck = true;
             }
-            if !struck {
-                *last = reading;
-            } else if reading.is_finite() {
+            if !reading.is_finite() {
+                *fault = 0.0;
+            } else if struck {
                 *fault = reading - healthy;
             } else {
-                *fault = 0.0;
+                *last = reading;
             }
             *y = reading;
         }

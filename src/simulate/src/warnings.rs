@@ -12,6 +12,11 @@ const SHARE_OUTSIDE: f64 = 0.05;
 /// Share of the samples of a run that may be spent waiting after mode switches without a warning.
 const SHARE_UNJUDGED: f64 = 0.25;
 
+/// Share of the samples of a run in which an input may be at a limit without a warning.
+const SHARE_SATURATED: f64 = 0.05;
+/// Standard deviation of a command's noise, relative to its range, without a warning.
+const COMMAND_NOISE: f64 = 0.1;
+
 /// What limits the conclusions from one run.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
@@ -29,6 +34,20 @@ pub enum RunWarning {
         share: f64,
         /// How many times thresholds were widened at most.
         widening: f64,
+    },
+    /// An input was at a limit for many samples, while what is proved holds only inside the limits.
+    Saturated {
+        /// The input, from 0.
+        input: usize,
+        /// Share of the samples, 0 to 1.
+        share: f64,
+    },
+    /// The noise of the sensors alone moves a command by a large part of its range.
+    NoisyCommand {
+        /// The input, from 0.
+        input: usize,
+        /// Standard deviation in physical units.
+        deviation: f64,
     },
     /// The plant's equations could not be integrated further.
     Stopped {
@@ -56,7 +75,52 @@ pub fn of_runs(design: &Design, runs: &[Trajectory]) -> Vec<RunWarning> {
     let unjudged = ftc.into_iter().flat_map(|run| unjudged(design, run));
     let stopped = runs.iter().filter_map(|run| stopped(design, run));
     let diodes = runs.iter().filter_map(|run| diodes_conduct(design, run));
-    unjudged.chain(stopped).chain(diodes).collect()
+    let saturated = ftc.into_iter().flat_map(|run| saturated(design, run));
+    unjudged
+        .chain(saturated)
+        .chain(noisy_commands(design))
+        .chain(stopped)
+        .chain(diodes)
+        .collect()
+}
+
+/// Inputs that spend many samples of a run at a limit.
+fn saturated(design: &Design, run: &Trajectory) -> Vec<RunWarning> {
+    let samples = run.records.len().max(1) as f64;
+    let limits = design.controller.input_limits.iter().enumerate();
+    let shares = limits.map(|(input, limit)| {
+        let at_limit = |record: &&Record| {
+            let u = Some(record.u[input]);
+            u == limit.min || u == limit.max
+        };
+        (
+            input,
+            run.records.iter().filter(at_limit).count() as f64 / samples,
+        )
+    });
+    shares
+        .filter(|(_, share)| *share > SHARE_SATURATED)
+        .map(|(input, share)| RunWarning::Saturated { input, share })
+        .collect()
+}
+
+/// Commands that the noise of the sensors moves by a large part of their range (or nominal value).
+fn noisy_commands(design: &Design) -> Vec<RunWarning> {
+    let Some(synthesis) = &design.synthesis else {
+        return Vec::new();
+    };
+    let noise = &synthesis.running_loop.command_noise;
+    let inputs = design.signals.inputs.iter().enumerate();
+    let deviations = inputs.map(|(index, input)| {
+        let range = input.min.zip(input.max);
+        let range = range.map_or(input.nominal, |(min, max)| (max - min) / 2.0);
+        let largest = noise.iter().map(|mode| mode[index]).fold(0.0, f64::max);
+        (index, largest, range)
+    });
+    deviations
+        .filter(|(_, deviation, range)| *deviation > COMMAND_NOISE * range)
+        .map(|(input, deviation, _)| RunWarning::NoisyCommand { input, deviation })
+        .collect()
 }
 
 /// How much of a run the estimator could not judge, and why.

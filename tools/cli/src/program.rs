@@ -300,6 +300,7 @@ fn export(
     for path in &exported.paths {
         let _ = writeln!(text, "wrote {}", path.display());
     }
+    let _ = writeln!(text, "coupling: {}", exported.coupling);
     let platforms: Vec<String> = exported
         .packed
         .iter()
@@ -315,6 +316,7 @@ fn export(
             "left out {platform}: its binaries are older than this program's: run make fmu-all"
         );
     }
+    text += &warnings::text(exported.misfit.as_slice());
     Ok(text + &warnings::text(&made.warnings))
 }
 

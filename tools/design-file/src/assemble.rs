@@ -254,6 +254,7 @@ fn signals(
         inputs,
         outputs,
         states,
+        disturbances: Vec::new(),
     };
     complete_nominal_values(&mut signals, plant);
     Ok(signals)

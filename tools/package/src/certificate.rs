@@ -1,13 +1,16 @@
 //! `resources/certificate.json`: what an FMU's design promises, and what proves it.
 
-use ftc_design::{ControlCertificate, Design, DwellTime, Lyapunov, ObserverCertificate};
+use ftc_design::{
+    ControlCertificate, Design, DwellTime, LostCertificate, Lyapunov, ObserverCertificate,
+    RunningLoop,
+};
 use serde::{Deserialize, Serialize};
 
 /// Where it stands in an FMU.
 pub const PATH: &str = "resources/certificate.json";
 
 /// Version of its layout.
-const FORMAT: u32 = 1;
+const FORMAT: u32 = 2;
 
 /// Identifier under which the design's fingerprint is taken.
 const IDENTIFIER: &str = "certificate";
@@ -37,6 +40,8 @@ pub struct Claims {
     pub gamma: Option<Vec<f64>>,
     /// Promises of the observer.
     pub observer: Promise,
+    /// Promises of the loop that runs: gains, and what losing sensors leaves.
+    pub running_loop: RunningLoop,
 }
 
 /// Stability of one of the two loops.
@@ -60,6 +65,8 @@ pub struct Proof {
     pub state_feedback: ControlCertificate,
     /// Of the observer.
     pub observer: ObserverCertificate,
+    /// Of the observer with sensors lost.
+    pub lost: Option<LostCertificate>,
 }
 
 impl Certificate {
@@ -82,10 +89,12 @@ impl Certificate {
                     decay: observer.spec.decay,
                     dwell: observer.dwell,
                 },
+                running_loop: synthesis.running_loop.clone(),
             },
             proof: Proof {
                 state_feedback: control.certificate.clone(),
                 observer: observer.certificate.clone(),
+                lost: observer.lost.clone(),
             },
         })
     }
@@ -111,54 +120,5 @@ impl Certificate {
             Some((_, what)) => Err(format!("{PATH} {what}: export the design again")),
             None => Ok(()),
         }
-    }
-}
-
-/// Whether the gains that run on line are those that the certificate is about.
-///
-/// # Errors
-/// One sentence that names the first part that differs.
-pub fn covers_what_runs(design: &Design) -> Result<(), String> {
-    let synthesis = design
-        .synthesis
-        .as_ref()
-        .ok_or("resources/design.json holds no proof: export the design again")?;
-    let running = &design.controller.feedback;
-    let proved = &synthesis.state_feedback;
-    let differs =
-        |what: &str| format!("{what} of the controller is not what was proved: export it again");
-    if running.tracked != proved.spec.tracked {
-        return Err(differs("the choice of tracked outputs"));
-    }
-    if running.latency != proved.spec.latency {
-        return Err(differs("the latency"));
-    }
-    if running.resonators != proved.spec.resonators {
-        return Err(differs("the internal model"));
-    }
-    let pairs = running.modes.iter().zip(&proved.modes);
-    for (mode, (runs, gains)) in pairs.enumerate() {
-        let parts = [
-            (
-                &runs.state_feedback,
-                &gains.state_feedback,
-                "the state feedback",
-            ),
-            (&runs.integral, &gains.integral, "the integral gain"),
-            (
-                &runs.previous_input,
-                &gains.previous_input,
-                "the gain of the previous input",
-            ),
-        ];
-        if let Some((.., what)) = parts.iter().find(|(runs, gains, _)| runs != gains) {
-            return Err(differs(&format!("mode {}: {what}", mode + 1)));
-        }
-    }
-    match running.modes.len() == proved.modes.len()
-        && design.controller.observer == synthesis.observer.observer
-    {
-        true => Ok(()),
-        false => Err(differs("the observer")),
     }
 }

@@ -10,6 +10,7 @@ use ftc_design::Design;
 use ftc_simulate::Trajectory;
 use model_description::xml::{self, Document};
 use model_description::{CONTROLLER, Interface, PLANT, VariableTable};
+use report::connection::{self, Side};
 use report::documentation;
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -21,8 +22,9 @@ pub(crate) struct Kind {
     suffix: &'static str,
     /// Name of the generic binary, and the fingerprint's identifier.
     pub binary: &'static str,
-    /// One line for the description.
+    /// One line for the description, before how it is to be stepped.
     description: &'static str,
+    side: Side,
     table: fn(&Interface) -> VariableTable,
 }
 
@@ -32,12 +34,14 @@ pub(crate) const KINDS: [Kind; 2] = [
         suffix: "controller",
         binary: CONTROLLER,
         description: "Sensor-fault-tolerant controller of a switched plant",
+        side: Side::Controller,
         table: model_description::controller,
     },
     Kind {
         suffix: "plant",
         binary: PLANT,
         description: "Switched plant with its scenario: reference, modes, sensor faults, disturbance, noise",
+        side: Side::Plant,
         table: model_description::plant,
     },
 ];
@@ -93,6 +97,10 @@ pub struct Exported {
     pub packed: Vec<Packed>,
     /// Platforms whose binaries are older than those of this machine and were left out.
     pub outdated: Vec<&'static str>,
+    /// How the FMUs must be stepped.
+    pub coupling: &'static str,
+    /// What does not fit in the package, if one was written.
+    pub misfit: Option<String>,
 }
 
 /// A platform for which an FMU holds a binary.
@@ -150,6 +158,8 @@ pub fn export(design: &Design, options: &Options) -> Result<Exported, Error> {
     Ok(Exported {
         paths: staging.commit()?,
         packed: packed.collect(),
+        coupling: connection::coupling(design),
+        misfit: options.ssp.then(|| connection::misfit(design)).flatten(),
         outdated: outdated
             .iter()
             .map(|binaries| binaries.platform.name)
@@ -173,7 +183,7 @@ impl Kind {
         xml::write(&Document {
             model_name: identifier,
             model_identifier: identifier,
-            description: self.description,
+            description: &format!("{}. {}", self.description, connection::coupling(design)),
             guid: &model_description::guid(self.binary, resource),
             version: env!("CARGO_PKG_VERSION"),
             license: env!("CARGO_PKG_LICENSE"),
@@ -219,7 +229,7 @@ impl Exporter<'_> {
     fn document(&self, kind: &Kind) -> String {
         let title = format!("{}: {}", self.design.name, kind.suffix);
         let lead = format!("{}.", kind.description);
-        documentation::page(self.design, &self.runs, title, lead)
+        documentation::page(self.design, &self.runs, Some(kind.side), title, lead)
     }
 
     /// The SSP package: the FMUs under `resources/` beside the description of how they connect.
@@ -231,7 +241,10 @@ impl Exporter<'_> {
         };
         let system = System {
             name: &self.design.name,
-            description: "Switched plant under sensor-fault-tolerant control",
+            description: &format!(
+                "Switched plant under sensor-fault-tolerant control. {}",
+                connection::coupling(self.design)
+            ),
             stop_time: self.interface.stop_time,
             step_size: self.interface.sample_time,
             components: KINDS.iter().map(component).collect(),

@@ -3,10 +3,11 @@
 //! A connection is not listed anywhere: an output goes to every input of another component that
 //! has the same role and the same place in its vector.
 
-use model_description::xml::GENERATION_TIME;
-use model_description::{Causality, Kind, VariableTable};
+use model_description::xml::{GENERATION_TIME, base_unit};
+use model_description::{Causality, Kind, Variable, VariableTable};
 use quick_xml::Writer;
 use quick_xml::events::{BytesDecl, Event};
+use std::collections::BTreeSet;
 use std::io;
 
 /// One FMU of the system.
@@ -62,6 +63,10 @@ pub fn describe(system: &System) -> io::Result<Vec<u8>> {
                 "xmlns:osp",
                 "http://opensimulationplatform.com/SSP/OSPAnnotations",
             ),
+            (
+                "xmlns:oms",
+                "https://raw.githubusercontent.com/OpenModelica/OMSimulator/master/schema/oms.xsd",
+            ),
             ("version", "1.0"),
             ("name", system.name),
             (
@@ -72,6 +77,7 @@ pub fn describe(system: &System) -> io::Result<Vec<u8>> {
         ])
         .write_inner_content(|xml| {
             write_system(xml, system)?;
+            write_units(xml, system)?;
             write_experiment(xml, system)
         })?;
     let mut bytes = xml.into_inner();
@@ -80,56 +86,130 @@ pub fn describe(system: &System) -> io::Result<Vec<u8>> {
 }
 
 fn write_system(xml: &mut Xml, system: &System) -> io::Result<()> {
-    xml.create_element("ssd:System")
-        .with_attributes([("name", system.name), ("description", system.description)])
-        .write_inner_content(|xml| {
-            xml.create_element("ssd:Elements")
-                .write_inner_content(|xml| {
+    let connections = &connections(&system.components);
+    element(
+        xml,
+        "ssd:System",
+        |xml| {
+            element(
+                xml,
+                "ssd:Elements",
+                |xml| {
                     let mut components = system.components.iter();
-                    components.try_for_each(|component| write_component(xml, component))
-                })?;
-            xml.create_element("ssd:Connections")
-                .write_inner_content(|xml| {
-                    let mut connections = connections(&system.components).into_iter();
-                    connections.try_for_each(|ends| write_connection(xml, ends))
-                })
-                .map(drop)
-        })
-        .map(drop)
+                    components
+                        .try_for_each(|component| write_component(xml, component, connections))
+                },
+                [],
+            )?;
+            element(
+                xml,
+                "ssd:Connections",
+                |xml| {
+                    let mut connections = connections.iter();
+                    connections.try_for_each(|ends| write_connection(xml, *ends))
+                },
+                [],
+            )?;
+            element(
+                xml,
+                "ssd:Annotations",
+                |xml| write_for_openmodelica(xml, system),
+                [],
+            )
+        },
+        [("name", system.name), ("description", system.description)],
+    )
 }
 
-fn write_component(xml: &mut Xml, component: &Component) -> io::Result<()> {
-    xml.create_element("ssd:Component")
-        .with_attributes([
-            ("name", component.name),
-            ("type", "application/x-fmu-sharedlibrary"),
-            ("source", &component.source),
-        ])
-        .write_inner_content(|xml| {
-            xml.create_element("ssd:Connectors")
-                .write_inner_content(|xml| {
-                    component.table.iter().try_for_each(|(_, variable)| {
-                        let kind = match variable.causality {
-                            Causality::Input => "input",
-                            Causality::Output => "output",
-                            Causality::Parameter => "parameter",
-                        };
-                        let value = match variable.kind {
-                            Kind::Real { .. } => "ssc:Real",
-                            Kind::Integer { .. } => "ssc:Integer",
-                            Kind::Boolean => "ssc:Boolean",
-                        };
-                        xml.create_element("ssd:Connector")
-                            .with_attributes([("name", variable.name.as_str()), ("kind", kind)])
-                            .write_inner_content(|xml| {
-                                xml.create_element(value).write_empty().map(drop)
-                            })
-                            .map(drop)
-                    })
-                })
-                .map(drop)
-        })
-        .map(drop)
+/// Inputs that nothing is connected to are left to their start values: masters set connectors
+/// that are not connected to 0, or wire them to something.
+fn write_component(xml: &mut Xml, component: &Component, connections: &[Ends]) -> io::Result<()> {
+    let offered = |variable: &Variable| {
+        let end = (component.name, variable.name.as_str());
+        variable.causality != Causality::Input || connections.iter().any(|[_, to]| *to == end)
+    };
+    let attributes = [
+        ("name", component.name),
+        ("type", "application/x-fmu-sharedlibrary"),
+        ("source", &component.source),
+    ];
+    element(
+        xml,
+        "ssd:Component",
+        |xml| {
+            element(
+                xml,
+                "ssd:Connectors",
+                |xml| {
+                    let mut variables = component
+                        .table
+                        .iter()
+                        .filter(|(_, variable)| offered(variable));
+                    variables.try_for_each(|(_, variable)| write_connector(xml, variable))
+                },
+                [],
+            )
+        },
+        attributes,
+    )
+}
+
+fn write_connector(xml: &mut Xml, variable: &Variable) -> io::Result<()> {
+    let kind = match variable.causality {
+        Causality::Input => "input",
+        Causality::Output => "output",
+        Causality::Parameter => "parameter",
+    };
+    let value = match variable.kind {
+        Kind::Real { .. } => "ssc:Real",
+        Kind::Integer { .. } => "ssc:Integer",
+        Kind::Boolean => "ssc:Boolean",
+    };
+    let unit = unit(variable).map(|unit| ("unit", unit));
+    let attributes = [("name", variable.name.as_str()), ("kind", kind)];
+    element(
+        xml,
+        "ssd:Connector",
+        |xml| leaf(xml, value, unit),
+        attributes,
+    )
+}
+
+fn unit(variable: &Variable) -> Option<&str> {
+    match &variable.kind {
+        Kind::Real { unit, .. } => unit.as_deref(),
+        _ => None,
+    }
+}
+
+/// Each unit of a connector; one that is not known has an empty base unit, as the standard wants
+/// one.
+fn write_units(xml: &mut Xml, system: &System) -> io::Result<()> {
+    let tables = system.components.iter().map(|component| &component.table);
+    let variables = tables.flat_map(|table| table.iter());
+    let units: BTreeSet<&str> = variables
+        .filter_map(|(_, variable)| unit(variable))
+        .collect();
+    if units.is_empty() {
+        return Ok(());
+    }
+    element(
+        xml,
+        "ssd:Units",
+        |xml| {
+            units.iter().try_for_each(|unit| {
+                let base = base_unit(unit).unwrap_or_default();
+                let base = base.iter().map(|(name, value)| (*name, value.as_str()));
+                element(
+                    xml,
+                    "ssc:Unit",
+                    |xml| leaf(xml, "ssc:BaseUnit", base),
+                    [("name", *unit)],
+                )
+            })
+        },
+        [],
+    )
 }
 
 /// Both ends of a connection: component and variable, from an output to an input.
@@ -161,43 +241,104 @@ fn connections<'a>(components: &'a [Component]) -> Vec<Ends<'a>> {
 }
 
 fn write_connection(xml: &mut Xml, [from, to]: Ends) -> io::Result<()> {
-    xml.create_element("ssd:Connection")
-        .with_attributes([
-            ("startElement", from.0),
-            ("startConnector", from.1),
-            ("endElement", to.0),
-            ("endConnector", to.1),
-        ])
-        .write_empty()
-        .map(drop)
+    let ends = [
+        ("startElement", from.0),
+        ("startConnector", from.1),
+        ("endElement", to.0),
+        ("endConnector", to.1),
+    ];
+    leaf(xml, "ssd:Connection", ends)
 }
 
-/// The standard knows start and stop; the communication step is said in the annotation that the
-/// Open Simulation Platform reads (no attribute may stand at its `Algorithm`). Others ignore it.
+/// The standard knows start and stop; the communication step is said in the annotations of two
+/// masters (no attribute may stand at the `Algorithm` of the Open Simulation Platform). Others
+/// ignore them.
 fn write_experiment(xml: &mut Xml, system: &System) -> io::Result<()> {
     let stop_time = format!("{:?}", system.stop_time);
     let step_size = format!("{:?}", system.step_size);
-    xml.create_element("ssd:DefaultExperiment")
-        .with_attributes([("startTime", "0.0"), ("stopTime", stop_time.as_str())])
-        .write_inner_content(|xml| {
-            xml.create_element("ssd:Annotations")
-                .write_inner_content(|xml| {
-                    xml.create_element("ssc:Annotation")
-                        .with_attribute(("type", "com.opensimulationplatform"))
-                        .write_inner_content(|xml| {
-                            xml.create_element("osp:Algorithm")
-                                .write_inner_content(|xml| {
-                                    xml.create_element("osp:FixedStepAlgorithm")
-                                        .with_attribute(("baseStepSize", step_size.as_str()))
-                                        .write_empty()
-                                        .map(drop)
-                                })
-                                .map(drop)
-                        })
-                        .map(drop)
-                })
-                .map(drop)
-        })
+    let times = [("startTime", "0.0"), ("stopTime", stop_time.as_str())];
+    element(
+        xml,
+        "ssd:DefaultExperiment",
+        |xml| {
+            element(
+                xml,
+                "ssd:Annotations",
+                |xml| {
+                    let step = [("baseStepSize", step_size.as_str())];
+                    element(
+                        xml,
+                        "ssc:Annotation",
+                        |xml| {
+                            element(
+                                xml,
+                                "osp:Algorithm",
+                                |xml| leaf(xml, "osp:FixedStepAlgorithm", step),
+                                [],
+                            )
+                        },
+                        [("type", "com.opensimulationplatform")],
+                    )?;
+                    write_for_openmodelica(xml, system)
+                },
+                [],
+            )
+        },
+        times,
+    )
+}
+
+/// The master and its step, as OMSimulator reads them: it takes no package without.
+fn write_for_openmodelica(xml: &mut Xml, system: &System) -> io::Result<()> {
+    let step_size = format!("{:?}", system.step_size);
+    let master = [
+        ("description", "oms-ma"),
+        ("stepSize", step_size.as_str()),
+        ("absoluteTolerance", "1e-4"),
+        ("relativeTolerance", "1e-4"),
+    ];
+    element(
+        xml,
+        "ssc:Annotation",
+        |xml| {
+            element(
+                xml,
+                "oms:Annotations",
+                |xml| {
+                    element(
+                        xml,
+                        "oms:SimulationInformation",
+                        |xml| leaf(xml, "oms:FixedStepMaster", master),
+                        [],
+                    )
+                },
+                [],
+            )
+        },
+        [("type", "org.openmodelica")],
+    )
+}
+
+/// An element with children.
+fn element<'a>(
+    xml: &mut Xml,
+    name: &str,
+    children: impl FnOnce(&mut Xml) -> io::Result<()>,
+    attributes: impl IntoIterator<Item = (&'a str, &'a str)>,
+) -> io::Result<()> {
+    let element = xml.create_element(name).with_attributes(attributes);
+    element.write_inner_content(children).map(drop)
+}
+
+/// An element without.
+fn leaf<'a>(
+    xml: &mut Xml,
+    name: &str,
+    attributes: impl IntoIterator<Item = (&'a str, &'a str)>,
+) -> io::Result<()> {
+    xml.create_element(name)
+        .with_attributes(attributes)
+        .write_empty()
         .map(drop)
 }
 
@@ -208,14 +349,18 @@ mod tests {
 
     fn system() -> System<'static> {
         let signals = |count| vec![SignalInfo::default(); count];
+        let measured = |unit: &str| SignalInfo {
+            unit: unit.into(),
+            ..SignalInfo::default()
+        };
         let interface = Interface {
             sample_time: 0.1,
             stop_time: 10.0,
             inputs: signals(2),
-            outputs: signals(3),
+            outputs: ["V", "degC", "furlong"].map(measured).into(),
             states: signals(4),
             tracked: vec![0, 2],
-            disturbances: 1,
+            disturbances: vec![SignalInfo::default()],
             modes: 2,
             thresholds: vec![1.0; 3],
         };
@@ -288,6 +433,37 @@ mod tests {
                 assert!(connectors.contains(&(part("Element"), part("Connector"))));
             }
         }
+        for unused in ["f_ext[1]", "w_ext[1]", "mode_ext", "mode_ext_real"] {
+            assert!(!connectors.contains(&("plant", unused)), "{unused}");
+        }
+        assert!(connectors.contains(&("controller", "fault_real[3]")));
+        let with_unit = elements("Real").filter(|node| node.attribute("unit") == Some("degC"));
+        // y, f_hat, residual and threshold of the controller; y, y_true and f of the plant.
+        assert_eq!(with_unit.count(), 7);
+        let units: Vec<_> = elements("Unit")
+            .map(|node| {
+                let base = node.first_element_child().unwrap();
+                (
+                    node.attribute("name").unwrap(),
+                    base.attribute("offset"),
+                    base.attribute("K"),
+                )
+            })
+            .collect();
+        let expected = [
+            ("V", None, None),
+            ("degC", Some("273.15"), Some("1")),
+            ("furlong", None, None),
+        ];
+        assert_eq!(units, expected);
+        // In the system, where OMSimulator looks, and beside the other's.
+        let masters: Vec<_> = elements("FixedStepMaster").collect();
+        assert_eq!(masters.len(), 2);
+        assert!(
+            masters
+                .iter()
+                .all(|master| master.attribute("stepSize") == Some("0.1"))
+        );
         let sources: Vec<_> = elements("Component")
             .filter_map(|node| node.attribute("source"))
             .collect();

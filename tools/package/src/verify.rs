@@ -4,7 +4,7 @@ use crate::Error;
 use crate::certificate::{self, Certificate, Promise};
 use crate::export::{KINDS, Kind};
 use crate::platform::PLATFORMS;
-use ftc_design::Design;
+use ftc_design::{Design, LostSensors};
 use roxmltree::Document;
 use serde_json::{Value, json};
 use std::collections::BTreeMap;
@@ -99,7 +99,7 @@ impl Fmu {
         let design: Design = parse(DESIGN, bytes)?;
         design.check().map_err(Unproved)?;
         let shipped: Certificate = parse(certificate::PATH, self.file(certificate::PATH)?)?;
-        certificate::covers_what_runs(&design).map_err(Unproved)?;
+        ftc_design::coverage::check(&design).map_err(Unproved)?;
         let expected = Certificate::of(&design, bytes)
             .ok_or_else(|| Unproved(format!("{DESIGN} holds no proof: export it again")))?;
         shipped.agree(&expected).map_err(Unproved)?;
@@ -211,16 +211,54 @@ impl fmt::Display for Verification {
         let claims = &self.certificate.claims;
         let modes = &self.design.controller.plant.modes;
         writeln!(f, "{}: proved", self.design.name)?;
-        let mut line = |name: &str, value: String| writeln!(f, "  {name:<22}{value}");
+        let mut line = |name: &str, value: String| writeln!(f, "  {name:<21} {value}");
         line("state feedback", promise(&claims.state_feedback))?;
         for (index, mode) in modes.iter().enumerate() {
             let gamma = claims.gamma.as_ref().map_or_else(
                 || "no attenuation is claimed".into(),
-                |gamma| format!("l2 gain from the disturbance at most {}", gamma[index]),
+                |gamma| {
+                    format!(
+                        "l2 gain from the disturbance at most {} with the state known",
+                        gamma[index]
+                    )
+                },
             );
             line(&format!("mode {} ({})", index + 1, mode.name), gamma)?;
         }
         line("observer", promise(&claims.observer))?;
+        let running = &claims.running_loop;
+        for (index, mode) in modes.iter().enumerate() {
+            let gamma = running
+                .gamma_loop
+                .as_ref()
+                .map_or_else(String::new, |gamma| {
+                    format!("gamma_loop at most {}, ", gamma[index])
+                });
+            let text = format!(
+                "{gamma}noise gain at most {}, gain of an unnoticed fault at most {}, while the mode lasts",
+                running.noise_gain[index], running.fault_gain[index]
+            );
+            line(&format!("loop, mode {} ({})", index + 1, mode.name), text)?;
+        }
+        line(
+            "loop, switching",
+            match (&running.switching, modes.len()) {
+                (Some(switching), _) => {
+                    format!(
+                        "gamma_loop at most {} under arbitrary switching",
+                        switching.gamma
+                    )
+                }
+                (None, 1) => "there is one mode".into(),
+                (None, _) => "stable as above; no gain is claimed across a switch".into(),
+            },
+        )?;
+        for entry in &running.lost {
+            line(
+                &format!("without {}", lost(&self.design, &entry.sensors)),
+                survives(entry),
+            )?;
+        }
         line(
             "scope",
             format!("the linear loop of {DESIGN}, while no input is at a limit"),
@@ -229,6 +267,9 @@ impl fmt::Display for Verification {
             "how",
             "every inequality of the shipped doubles, rounding included; nothing was solved".into(),
         )?;
+        for (index, what) in ftc_design::coverage::UNCOVERED.iter().enumerate() {
+            line(if index == 0 { "not proved" } else { "" }, (*what).into())?;
+        }
         line(
             "binaries",
             format!(
@@ -257,9 +298,34 @@ impl Verification {
             "name": self.design.name,
             "state_feedback": of(&claims.state_feedback),
             "gamma": claims.gamma,
+            "gamma_loop": claims.running_loop.gamma_loop,
+            "gamma_loop_switching": claims.running_loop.switching.as_ref().map(|s| s.gamma),
+            "noise_gain": claims.running_loop.noise_gain,
+            "fault_gain": claims.running_loop.fault_gain,
+            "lost_sensors": claims.running_loop.lost,
             "observer": of(&claims.observer),
+            "not_proved": ftc_design::coverage::UNCOVERED,
             "platforms": self.platforms,
         })
+    }
+}
+
+/// The names of lost sensors.
+fn lost(design: &Design, sensors: &[usize]) -> String {
+    let outputs = &design.signals.outputs;
+    let names: Vec<&str> = sensors.iter().map(|&k| outputs[k].name.as_str()).collect();
+    names.join(" + ")
+}
+
+/// What is proved with some sensors lost.
+fn survives(entry: &LostSensors) -> String {
+    match (entry.stable, &entry.gamma_loop) {
+        (false, _) => "not served".into(),
+        (true, None) => "stable".into(),
+        (true, Some(gamma)) => {
+            let gamma: Vec<String> = gamma.iter().map(f64::to_string).collect();
+            format!("stable, gamma_loop at most {} by mode", gamma.join(", "))
+        }
     }
 }
 

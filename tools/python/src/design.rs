@@ -84,7 +84,7 @@ impl Design {
         wait(py, "simulating", None, move || {
             let runs = report::documentation::runs(&made.design);
             let lead = "Sensor-fault-tolerant controller of a switched plant.".into();
-            report::documentation::page(&made.design, &runs, made.design.name.clone(), lead)
+            report::documentation::page(&made.design, &runs, None, made.design.name.clone(), lead)
         })
     }
 

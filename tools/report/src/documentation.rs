@@ -2,6 +2,7 @@
 //! design report.
 
 use crate::Scene;
+use crate::connection::{self, Side};
 use crate::page::{Block, Page, Section};
 use crate::{simulate, summary};
 use ftc_design::Design;
@@ -18,8 +19,14 @@ pub fn runs(design: &Design) -> Vec<Trajectory> {
     shows.map(|variant| simulate::one(&shown, variant)).into()
 }
 
-/// The page of one of the two FMUs, of which `title` and `lead` speak.
-pub fn page(design: &Design, runs: &[Trajectory], title: String, lead: String) -> String {
+/// The page of one of the two FMUs, of which `title` and `lead` speak; without a side, of the design.
+pub fn page(
+    design: &Design,
+    runs: &[Trajectory],
+    side: Option<Side>,
+    title: String,
+    lead: String,
+) -> String {
     let scene = Scene::new(design, runs);
     let sections = [
         Section::new("Outputs")
@@ -37,9 +44,10 @@ pub fn page(design: &Design, runs: &[Trajectory], title: String, lead: String) -
     Page {
         title,
         lead,
-        sections: sections
+        sections: side
+            .map(|side| connection::section(design, side))
             .into_iter()
-            .filter(shows_something)
+            .chain(sections.into_iter().filter(shows_something))
             .chain(report)
             .collect(),
         footer: format!("Made by ftc-fmu {}.", env!("CARGO_PKG_VERSION")),

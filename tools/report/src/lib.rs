@@ -11,11 +11,13 @@
 //! size in pixels and spend a third of a phone's width on the legend.
 
 mod axis;
+pub mod connection;
 mod decimate;
 mod demo;
 pub mod documentation;
 pub mod figure;
 pub mod page;
+mod running_loop;
 pub mod simulate;
 pub mod style;
 pub mod summary;

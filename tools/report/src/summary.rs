@@ -1,8 +1,10 @@
 //! The design report, for a person and for a program.
 
+use crate::running_loop;
 use crate::text::count;
 use crate::warnings;
 use ftc_control::parameters::{EstimatorMethod, ObserverKind};
+use ftc_design::augmented::assumes_input_disturbance;
 use ftc_design::{ControlSpec, Design, DesignError, ObserverDesign, Signal, StateFeedback};
 use serde_json::{Value, json};
 use std::fmt::Write;
@@ -13,7 +15,7 @@ pub fn text(design: &Design, warnings: &[String]) -> String {
     for (title, lines) in sections(design) {
         let _ = writeln!(text, "{title}");
         for (name, value) in lines {
-            let _ = writeln!(text, "  {name:<22}{value}");
+            let _ = writeln!(text, "  {name:<21} {value}");
         }
         text.push('\n');
     }
@@ -33,6 +35,10 @@ pub fn sections(design: &Design) -> Vec<Section> {
         ));
     }
     sections.push(("Observer", observer(design)));
+    if let Some(synthesis) = &design.synthesis {
+        sections.push(("Running loop", running_loop::gains(design, synthesis)));
+        sections.push(("Lost sensors", running_loop::lost(design, synthesis)));
+    }
     sections.push(("Fault estimator", estimator(design)));
     if let Some(synthesis) = &design.synthesis {
         sections.push(("Certificate", certificate(&synthesis.state_feedback)));
@@ -48,7 +54,12 @@ fn overview(design: &Design) -> Vec<(String, String)> {
     let plant = &design.controller.plant;
     let dims = plant.dimensions();
     let names: Vec<&str> = plant.modes.iter().map(|mode| mode.name.as_str()).collect();
-    vec![
+    let survival = design
+        .synthesis
+        .as_ref()
+        .map(|synthesis| line("lost sensors", running_loop::survival(design, synthesis)));
+    let mut lines: Vec<_> = survival.into_iter().collect();
+    lines.extend([
         line("name", &design.name),
         line("sample time", format!("{} s", plant.sample_time)),
         line(
@@ -62,7 +73,8 @@ fn overview(design: &Design) -> Vec<(String, String)> {
             ),
         ),
         line("modes", names.join(", ")),
-    ]
+    ]);
+    lines
 }
 
 fn feedback(design: &Design, control: &StateFeedback) -> Vec<(String, String)> {
@@ -75,6 +87,13 @@ fn feedback(design: &Design, control: &StateFeedback) -> Vec<(String, String)> {
     let mut lines = vec![
         line("tracked outputs", tracked.join(", ")),
         line("latency", count(spec.latency, "sample")),
+        line(
+            "disturbance",
+            match assumes_input_disturbance(&design.controller.plant) {
+                true => "none is given (E, F): one at the inputs (E = B) is assumed",
+                false => "as given (E, F)",
+            },
+        ),
         line("decay asked", format!("{} per sample", spec.decay)),
     ];
     lines.extend(internal_model(design, control));
@@ -97,7 +116,7 @@ fn attenuation(control: &StateFeedback, mode: usize) -> String {
     let gamma = match gamma < 1e-3 {
         true => format!("gamma {gamma:.1e}"),
         false => format!("gamma {gamma:.4}"),
-    };
+    } + " with the state known";
     match control.is_optimal(mode) {
         Some(false) => gamma + " (not proved optimal)",
         _ => gamma,
@@ -232,6 +251,10 @@ pub fn json(design: &Design, warnings: &[String]) -> String {
         .synthesis
         .as_ref()
         .map(|synthesis| &synthesis.state_feedback);
+    let running = design
+        .synthesis
+        .as_ref()
+        .map(|synthesis| &synthesis.running_loop);
     let deviations: Vec<&Vec<f64>> = estimator.predictors.iter().map(|p| &p.deviation).collect();
     let samples: Vec<usize> = estimator.predictors.iter().map(|p| p.samples).collect();
     let value = json!({
@@ -239,6 +262,14 @@ pub fn json(design: &Design, warnings: &[String]) -> String {
         "feasible": true,
         "certified": control.is_some(),
         "gamma": control.and_then(|c| c.gamma.clone()),
+        "gamma_loop": running.and_then(|r| r.gamma_loop.clone()),
+        "gamma_loop_switching": running.and_then(|r| r.switching.as_ref().map(|s| s.gamma)),
+        "noise_gain": running.map(|r| r.noise_gain.clone()),
+        "fault_gain": running.map(|r| r.fault_gain.clone()),
+        "command_noise": running.map(|r| r.command_noise.clone()),
+        "disturbance": if assumes_input_disturbance(&design.controller.plant) { "assumed at the inputs (B)" } else { "given (E, F)" },
+        "lost_sensors": running.map(|r| running_loop::json(design, &r.lost)),
+        "lost_sensors_minimum_dwell": design.controller.observer.minimum_dwell,
         "gamma_is_optimal": control.and_then(|c| (0..c.modes.len()).map(|mode| c.is_optimal(mode)).collect::<Option<Vec<_>>>()),
         "decay": control.map(|c| c.spec.decay),
         "spectral_radius": control.map(|c| c.spectral_radius.clone()),

@@ -45,6 +45,7 @@ fn paper(noise: f64) -> Design {
             inputs: signals(2, "u", None),
             outputs: signals(2, "y", None),
             states: signals(2, "x", None),
+            disturbances: Vec::new(),
         },
         controller,
         truth: Truth::default(),
@@ -71,7 +72,6 @@ fn lags(outputs: usize, disturbances: usize, steps: u64) -> Design {
         feedforward: DMatrix::zeros(outputs, 0),
         previous_input: DMatrix::zeros(outputs, 0),
         anti_windup: DMatrix::zeros(outputs, outputs),
-        integral_inverse: &square * 5.0,
         output_feedback: &square * -0.1,
     };
     let nothing = Gain(DMatrix::zeros(outputs, outputs));
@@ -87,13 +87,14 @@ fn lags(outputs: usize, disturbances: usize, steps: u64) -> Design {
             inputs: signals(outputs, "u", Some("V")),
             outputs: signals(outputs, "y", Some("A")),
             states: signals(outputs, "x", None),
+            disturbances: Vec::new(),
         },
         controller: ControllerParameters {
             feedback: StateFeedback {
                 tracked: (0..outputs).collect(),
                 latency: 0,
                 resonators: vec![],
-                bumpless: false,
+                transfer: None,
                 modes: vec![gains; 2],
             },
             observer: Observer {

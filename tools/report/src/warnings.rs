@@ -4,8 +4,9 @@ use crate::text::number;
 use design_file::healthy_log::file_of;
 use design_file::schema::DesignFile;
 use design_file::sentence::shorten;
-use ftc_design::Design;
+use ftc_design::state_feedback::REJECTION;
 use ftc_design::warnings::{Doubt, Guess, LoggedMovement, Warning};
+use ftc_design::{Design, Objective, Signal};
 use ftc_simulate::Trajectory;
 use ftc_simulate::warnings::RunWarning;
 use std::fmt::Write;
@@ -21,7 +22,39 @@ pub fn of_design(
     let sentences = warnings
         .iter()
         .map(|warning| of_warning(file, design, warning));
-    unknown.into_iter().chain(sentences).collect()
+    let idle = idle_weights(file, design);
+    unknown.into_iter().chain(idle).chain(sentences).collect()
+}
+
+/// Weights that were given and shape nothing.
+fn idle_weights(file: &DesignFile, design: &Design) -> Option<String> {
+    let asked = &file.controller;
+    let given = [
+        ("output_weight", asked.output_weight.is_some()),
+        ("integral_weight", asked.integral_weight.is_some()),
+        ("input_weight", asked.input_weight.is_some()),
+    ];
+    let names: Vec<String> = given
+        .iter()
+        .filter(|(_, given)| *given)
+        .map(|(name, _)| format!("controller.{name}"))
+        .collect();
+    let control = &design.synthesis.as_ref()?.state_feedback;
+    let reason = match (&control.gamma, control.spec.objective) {
+        (_, Objective::Decay) => {
+            "objective = \"decay\" looks at nothing but the decay: ask for \"attenuation\""
+        }
+        (None, Objective::Attenuation) => {
+            "no disturbance reaches the state: give E, F or a B that is not zero"
+        }
+        (Some(gamma), Objective::Attenuation) => {
+            let units = &control.certificate.units;
+            let rejection = REJECTION * units.performance / units.disturbance;
+            let rejected = gamma.iter().all(|&gamma| gamma <= rejection);
+            rejected.then_some("the disturbance can be rejected completely, whatever they are")?
+        }
+    };
+    (!names.is_empty()).then(|| format!("{} have no effect: {reason}", names.join(", ")))
 }
 
 const UNKNOWN_NOISE: &str = "neither scenario.noise nor estimator.threshold is given: a residual of a thousandth of an \
@@ -30,7 +63,11 @@ const UNKNOWN_NOISE: &str = "neither scenario.noise nor estimator.threshold is g
 /// Of the runs of a design.
 pub fn of_runs(design: &Design, runs: &[Trajectory]) -> Vec<String> {
     let warnings = ftc_simulate::warnings::of_runs(design, runs);
-    warnings.iter().map(of_run).collect()
+    let inputs = &design.signals.inputs;
+    warnings
+        .iter()
+        .map(|warning| of_run(inputs, warning))
+        .collect()
 }
 
 /// The warnings as a person reads them below a report.
@@ -110,7 +147,7 @@ fn of_doubt(doubt: &Doubt) -> String {
     }
 }
 
-fn of_run(warning: &RunWarning) -> String {
+fn of_run(inputs: &[Signal], warning: &RunWarning) -> String {
     let percent = |share: f64| format!("{:.1} % of the samples", 100.0 * share);
     match *warning {
         RunWarning::Unjudged {
@@ -126,6 +163,18 @@ fn of_run(warning: &RunWarning) -> String {
              wider: raise the inputs' nominal values, or log a run there",
             percent(share),
             number(widening.round())
+        ),
+        RunWarning::Saturated { input, share } => format!(
+            "ftc: {} is at a limit in {}, and what is proved holds only while no input is: raise \
+             controller.input_weight, ask for a slower decay, or widen its min and max",
+            inputs[input].name,
+            percent(share)
+        ),
+        RunWarning::NoisyCommand { input, deviation } => format!(
+            "ftc: the noise of the sensors moves {} by {} (standard deviation), more than a tenth of its range: raise \
+             controller.input_weight, or ask for slower decays",
+            inputs[input].name,
+            number(deviation)
         ),
         RunWarning::Stopped { variant, time } => format!(
             "{}: the plant's equations cannot be integrated beyond {time} s: the figures end there",

@@ -21,12 +21,21 @@ fn library() -> PathBuf {
     library
 }
 
-/// Compiles tests/c/drive.c with every warning an error.
-fn compile(folder: &Path) -> PathBuf {
-    let source = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../tests/c/drive.c");
-    let program = folder.join("drive");
+/// Compiles a program of tests/c with every warning an error.
+fn compile(folder: &Path, name: &str) -> PathBuf {
+    let sources = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../tests/c");
+    let source = sources.join(name).with_extension("c");
+    let program = folder.join(name);
     let compiled = Command::new("cc")
-        .args(["-std=c11", "-Wall", "-Wextra", "-Werror", "-O1", "-o"])
+        .args([
+            "-std=c11",
+            "-Wall",
+            "-Wextra",
+            "-Werror",
+            "-O1",
+            "-rdynamic",
+            "-o",
+        ])
         .arg(&program)
         .arg(source)
         .arg("-ldl")
@@ -41,7 +50,7 @@ fn a_c_program_gets_the_same_numbers() {
     let folder = tempfile::tempdir().unwrap();
     let resources = Resources::new(0.1);
     let (start, step, count) = (-1.5, 0.25, 40);
-    let run = Command::new(compile(folder.path()))
+    let run = Command::new(compile(folder.path(), "drive"))
         .arg(library())
         .arg(resources.guid.to_str().unwrap())
         .arg(resources.uri().to_str().unwrap())
@@ -83,4 +92,34 @@ fn hexadecimal(text: &str) -> f64 {
     let bits = u64::from_str_radix(&format!("{whole}{fraction}"), 16).unwrap();
     let scale = exponent.parse::<i32>().unwrap() - 4 * fraction.len() as i32;
     sign * bits as f64 * 2f64.powi(scale)
+}
+
+#[test]
+fn every_allocation_that_fails_is_an_answer() {
+    let folder = tempfile::tempdir().unwrap();
+    let resources = Resources::new(0.1);
+    let run = Command::new(compile(folder.path(), "memory"))
+        .arg(library())
+        .arg(resources.guid.to_str().unwrap())
+        .arg(resources.uri().to_str().unwrap())
+        .arg("warm")
+        .output()
+        .unwrap();
+    let (said, erred) = (&run.stdout, String::from_utf8_lossy(&run.stderr));
+    assert!(run.status.success(), "{}: {erred}", run.status);
+    let said = String::from_utf8(said.clone()).unwrap();
+    let met: Vec<(&str, u32)> = said
+        .lines()
+        .map(|line| line.split_once(' ').unwrap())
+        .map(|(operation, met)| (operation, met.parse().unwrap()))
+        .collect();
+    for (operation, least) in [
+        ("instantiate", 20),
+        ("save", 4),
+        ("deserialize", 4),
+        ("refused", 4),
+    ] {
+        let (_, met) = met.iter().find(|(name, _)| *name == operation).unwrap();
+        assert!(*met >= least, "{operation} met {met} failures");
+    }
 }

@@ -187,6 +187,15 @@ pub fn logger() -> LoggerCallback {
 
 impl Instance {
     pub fn new(resources: &Resources) -> Self {
+        Self::made(resources, callbacks, 1)
+    }
+
+    /// The same with callbacks made from its log, and logging switched on or off.
+    pub fn made(
+        resources: &Resources,
+        callbacks: impl FnOnce(&Messages) -> CallbackFunctions,
+        logging: Boolean,
+    ) -> Self {
         let messages: Box<Messages> = Box::default();
         let callbacks = callbacks(&messages);
         let c = unsafe {
@@ -197,7 +206,7 @@ impl Instance {
                 resources.uri().as_ptr(),
                 &callbacks,
                 0,
-                1,
+                logging,
             )
         };
         assert!(!c.is_null(), "{:?}", messages.lock().unwrap());
@@ -263,6 +272,15 @@ impl Instance {
         let mut state = std::ptr::null_mut();
         assert_eq!(unsafe { fmi2GetFMUstate(self.c, &mut state) }, Status::Ok);
         state
+    }
+
+    /// The warnings received so far.
+    pub fn warnings(&self) -> Vec<String> {
+        let messages = self.messages.lock().unwrap();
+        let warned = messages
+            .iter()
+            .filter(|(status, ..)| *status == Status::Warning);
+        warned.map(|(_, _, text)| text.clone()).collect()
     }
 
     pub fn last_message(&self) -> String {

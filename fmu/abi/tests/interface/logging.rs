@@ -1,4 +1,6 @@
 //! What the importer is told, and when it is left in peace.
+//!
+//! promise: heard-errors
 
 use crate::host::*;
 use fmu_abi::types::*;
@@ -28,18 +30,98 @@ fn categories_are_switched_one_by_one() {
     let error = || it.step(99.0, 1.0);
     let discard = || unsafe { fmi2GetStatus(it.c, 0, &mut 0) };
     let event = || unsafe { fmi2Reset(it.c) };
-    assert_eq!(heard(&error), ["logStatusError"]);
-    assert_eq!(heard(&discard), ["logStatusDiscard"]);
-    assert_eq!(switch(0, &[c"logStatusDiscard".as_ptr()]), Status::Ok);
-    assert_eq!(heard(&discard), Vec::<String>::new());
-    assert_eq!(heard(&error), ["logStatusError"]);
-    assert_eq!(switch(0, &[]), Status::Ok);
-    assert_eq!(heard(&error), Vec::<String>::new());
-    assert_eq!(switch(1, &[c"logEvents".as_ptr()]), Status::Ok);
-    assert_eq!(heard(&error), Vec::<String>::new());
     assert_eq!(heard(&event), ["logEvents"]);
+    assert_eq!(switch(0, &[c"logEvents".as_ptr()]), Status::Ok);
+    assert_eq!(heard(&event), Vec::<String>::new());
     assert_eq!(switch(1, &[c"logAll".as_ptr()]), Status::Ok);
-    assert_eq!(heard(&error), ["logStatusError"]);
+    assert_eq!(heard(&event), ["logEvents"]);
+    // What was refused is heard, whatever is switched.
+    for names in [
+        &[][..],
+        &[c"logStatusError".as_ptr(), c"logStatusDiscard".as_ptr()],
+    ] {
+        assert_eq!(switch(0, names), Status::Ok);
+        assert_eq!(heard(&error), ["logStatusError"]);
+        it.start(0.0);
+        assert_eq!(heard(&discard), ["logStatusDiscard"]);
+        assert_eq!(heard(&event), Vec::<String>::new());
+    }
+}
+
+#[test]
+fn refusals_and_warnings_are_heard_with_logging_off() {
+    let resources = Resources::new(0.1);
+    let it = Instance::made(&resources, callbacks, 0);
+    it.set_mode(0);
+    it.start(0.0);
+    assert_eq!(it.step(0.0, -1.0), Status::Error);
+    let messages = it.messages.lock().unwrap();
+    let categories: Vec<_> = messages
+        .iter()
+        .map(|(_, category, _)| category.as_str())
+        .collect();
+    assert_eq!(categories, ["logStatusWarning", "logStatusError"]);
+    assert!(messages[1].2.contains("communicationStepSize is -1"));
+}
+
+/// What a logger that calls the FMU needs: the instance, and what it saw.
+#[derive(Default)]
+struct Caller {
+    instance: Pointer,
+    heard: Vec<String>,
+    frees: bool,
+}
+
+unsafe extern "C" fn call_back(to: Pointer, _: Text, _: Status, _: Text, message: Text) {
+    let caller = unsafe { &mut *to.cast::<Caller>() };
+    let text = unsafe { std::ffi::CStr::from_ptr(message) };
+    caller.heard.push(text.to_string_lossy().into_owned());
+    if caller.instance.is_null() || caller.heard.len() > 3 {
+        return;
+    }
+    let (mut value, mut state) = (0.0, null_mut());
+    unsafe {
+        assert_eq!(
+            fmi2GetReal(caller.instance, &LATE[0], 1, &mut value),
+            Status::Ok
+        );
+        assert_eq!(fmi2GetFMUstate(caller.instance, &mut state), Status::Ok);
+        assert_eq!(fmi2FreeFMUstate(caller.instance, &mut state), Status::Ok);
+        // Refused, so the logger is called within itself.
+        assert_eq!(
+            fmi2SetReal(caller.instance, &LATE[0], 1, &value),
+            Status::Error
+        );
+        if caller.frees {
+            fmi2FreeInstance(caller.instance);
+            caller.instance = null_mut();
+        }
+    }
+}
+
+#[test]
+fn a_logger_may_call_the_fmu_and_even_free_it() {
+    type Fixed = unsafe extern "C" fn(Pointer, Text, Status, Text, Text);
+    let resources = Resources::new(0.1);
+    for frees in [false, true] {
+        let mut caller = Caller::default();
+        let functions = CallbackFunctions {
+            logger: Some(unsafe { std::mem::transmute::<Fixed, LoggerCallback>(call_back) }),
+            component_environment: (&raw mut caller).cast(),
+            ..callbacks(&Messages::default())
+        };
+        let it = Instance::made(&resources, |_| functions, 0);
+        it.start(0.0);
+        let c = it.c;
+        (caller.instance, caller.frees) = (c, frees);
+        assert_eq!(unsafe { fmi2DoStep(c, 0.0, -1.0, 1) }, Status::Error);
+        assert!(caller.heard.len() >= 2, "{:?}", caller.heard);
+        assert!(caller.heard[0].contains("communicationStepSize is -1"));
+        assert!(caller.heard[1].contains("late[1] is an output"));
+        if frees {
+            std::mem::forget(it);
+        }
+    }
 }
 
 #[test]

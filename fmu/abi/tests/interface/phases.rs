@@ -6,11 +6,12 @@ use fmu_abi::life_cycle::State;
 use fmu_abi::types::*;
 use std::ptr::null_mut;
 
-/// The states in which an instance can be; steps are synchronous and done whole.
-pub const REACHABLE: [State; 6] = [
+/// The states in which an instance can be; steps are synchronous.
+pub const REACHABLE: [State; 7] = [
     State::Instantiated,
     State::InitializationMode,
     State::StepComplete,
+    State::StepFailed,
     State::Terminated,
     State::Error,
     State::Fatal,
@@ -35,13 +36,17 @@ pub fn in_state(resources: &Resources, state: State) -> (Instance, Pointer) {
             assert_eq!(fmi2EnterInitializationMode(instance.c), Status::Ok);
         },
         State::StepComplete => instance.start(0.0),
+        State::StepFailed => {
+            instance.start(0.0);
+            assert_eq!(instance.step(0.0, 1e9), Status::Discard);
+        }
         State::Terminated => {
             instance.start(0.0);
             assert_eq!(unsafe { fmi2Terminate(instance.c) }, Status::Ok);
         }
         State::Error => assert_eq!(fail_with(FAIL), Status::Error),
         State::Fatal => assert_eq!(fail_with(PANIC), Status::Fatal),
-        _ => unreachable!("steps are synchronous and done whole"),
+        _ => unreachable!("steps are synchronous"),
     }
     (instance, saved)
 }

@@ -4,7 +4,7 @@
 
 use crate::host::*;
 use fmu_abi::clock::{Clock, Event};
-use fmu_abi::types::Status;
+use fmu_abi::types::{LAST_SUCCESSFUL_TIME, Status, TERMINATED};
 use proptest::prelude::*;
 
 /// Runs the steps with input 1 from `start`.
@@ -313,7 +313,6 @@ fn impossible_steps_are_refused_and_change_nothing() {
         (f64::INFINITY, 0.1, "currentCommunicationPoint is inf"),
         (0.3, 0.1, "currentCommunicationPoint is 0.3"),
         (0.1, 0.1, "currentCommunicationPoint is 0.1"),
-        (0.2, 1e300, "ticks"),
     ];
     for (from, step, expected) in cases {
         assert_eq!(instance.step(from, step), Status::Error, "{from}, {step}");
@@ -376,7 +375,121 @@ fn a_run_starts_at_its_start_time() {
 fn the_last_successful_time_is_told() {
     let instance = run([0.1, 0.35], 2.0);
     let mut time = f64::NAN;
-    let status =
-        unsafe { fmi2GetRealStatus(instance.c, fmu_abi::types::LAST_SUCCESSFUL_TIME, &mut time) };
+    let status = unsafe { fmi2GetRealStatus(instance.c, LAST_SUCCESSFUL_TIME, &mut time) };
     assert_eq!((status, time), (Status::Ok, 2.0 + 0.1 + 0.35));
+}
+
+#[test]
+fn a_step_is_taken_as_it_was_meant() {
+    let cases: [(f64, f64, u64, u64); 9] = [
+        // Sample time, step, steps for one tick, ticks in one step.
+        (1.0 / 60.0, 0.0166667, 1, 1),
+        (1.0, 0.99999, 1, 1),
+        (1.0, 1.0009, 1, 1),
+        (1.0 / 3.0, 0.333, 1, 1),
+        (1.0, 0.142857, 7, 1),
+        (1.0, 0.333, 3, 1),
+        (1.0, 0.0100001, 100, 1),
+        (0.1, 0.300001, 1, 3),
+        (1.0 / 60.0, 0.16667, 1, 10),
+    ];
+    for (at, (period, step, parts, ticks)) in cases.into_iter().enumerate() {
+        let steps = if at < 2 { 10_000_000 } else { 1_000_000 };
+        let mut sum = 0.0;
+        let added = (0..steps).map(|_| {
+            let from = sum;
+            sum += step;
+            (from, step)
+        });
+        let expected = steps / parts * ticks;
+        let (begun, ended) = count(period, 0.0, added);
+        let what = format!("{period} by {step}");
+        assert_eq!(ended, expected, "{what}");
+        assert!(begun == ended || begun == ended + 1, "{what}: {begun}");
+    }
+}
+
+#[test]
+fn points_rounded_to_four_digits_never_run_ahead_of_their_inputs() {
+    let rounded = |k: u64| (k as f64 / 30.0 * 1e4).round() / 1e4;
+    let mut clock = Clock::new(1.0 / 30.0);
+    clock.set_up(0.0, None).unwrap();
+    for k in 0..100_000 {
+        let before = clock.clone();
+        let step = rounded(k + 1) - rounded(k);
+        clock = clock.advanced(rounded(k), step).unwrap();
+        let events: Vec<_> = std::iter::from_fn(|| clock.next_event()).collect();
+        assert_eq!(events, [Event::Begin(k), Event::End(k)]);
+        assert!(!before.begins_within(k));
+    }
+}
+
+#[test]
+fn a_tick_on_old_inputs_is_told_once() {
+    let quiet = [
+        (0.1, 0.1),
+        (0.1, 0.099999),
+        (0.1, 0.1 / 7.0),
+        (0.1, 0.0142857),
+        (1.0 / 60.0, 0.0166667),
+        (0.1, 1e-5),
+    ];
+    for (period, step) in quiet {
+        let it = Instance::started(&Resources::new(period), 0.0);
+        for k in 0..300 {
+            assert_eq!(it.step(f64::from(k) * step, step), Status::Ok);
+        }
+        assert_eq!(it.warnings(), Vec::<String>::new(), "{period} by {step}");
+    }
+    for (period, step) in [
+        (0.1, 0.09),
+        (0.1, 0.11),
+        (0.1, 0.3),
+        (0.1, 0.07),
+        (1.0 / 60.0, 0.0167),
+    ] {
+        let it = Instance::started(&Resources::new(period), 0.0);
+        for k in 0..300 {
+            assert_eq!(it.step(f64::from(k) * step, step), Status::Ok);
+        }
+        let warnings = it.warnings();
+        assert_eq!(warnings.len(), 1, "{period} by {step}: {warnings:?}");
+        for words in [
+            "old inputs",
+            &format!("step of {step} s"),
+            &format!("time is {period} s"),
+        ] {
+            assert!(warnings[0].contains(words), "{warnings:?}");
+        }
+    }
+}
+
+#[test]
+fn a_step_of_too_many_ticks_is_done_in_part_and_discarded() {
+    let resources = Resources::new(0.1);
+    for length in [10_000.5, 1e9, 1e300] {
+        let it = Instance::started(&resources, 5.0);
+        it.set(INPUT[0], 1.0);
+        let saved = it.save();
+        assert_eq!(it.step(5.0, length), Status::Discard);
+        let message = it.last_message();
+        for words in ["100000 ticks", "up to 10005 s", "at most 10000 s"] {
+            assert!(message.contains(words), "{message}");
+        }
+        assert_eq!(it.ticks(), 100_000);
+        let (mut time, mut ends) = (0.0, -1);
+        let status = unsafe { fmi2GetRealStatus(it.c, LAST_SUCCESSFUL_TIME, &mut time) };
+        assert_eq!((status, time), (Status::Ok, 10_005.0));
+        let status = unsafe { fmi2GetBooleanStatus(it.c, TERMINATED, &mut ends) };
+        assert_eq!((status, ends), (Status::Ok, 0));
+        assert_eq!(
+            it.step(time, 0.1),
+            Status::Error,
+            "the standard's state 'step failed'"
+        );
+        assert_eq!(unsafe { fmi2SetFMUstate(it.c, saved) }, Status::Ok);
+        assert_eq!(it.step(5.0, 10_000.0), Status::Ok);
+        assert_eq!(it.step(10_005.0, 0.1), Status::Ok);
+        assert_eq!(it.ticks(), 100_001);
+    }
 }

@@ -1,4 +1,6 @@
 //! Getting and setting: types, ranges, pointers, and what a bad call leaves behind.
+//!
+//! promise: untold-mode
 
 use crate::host::*;
 use fmu_abi::types::Status;
@@ -220,18 +222,115 @@ fn initial_outputs_follow_initial_inputs() {
 }
 
 #[test]
-fn the_real_mode_wins_when_connected() {
+fn the_mode_comes_as_an_integer_or_as_a_real() {
     let it = started();
     it.set(INPUT[0], 1.0);
-    it.set_mode(2);
-    it.step(0.0, 0.1);
-    assert_eq!(it.real(LATE[0]), 2.0);
-    it.set(MODE_REAL, 3.0);
-    it.step(0.1, 0.1);
-    assert_eq!(it.real(LATE[0]), 5.0);
-    it.set(MODE_REAL, 0.0);
-    it.step(0.2, 0.1);
-    assert_eq!(it.real(LATE[0]), 7.0);
+    for (mode, twin, sum) in [(2, 0.0, 2.0), (0, 3.0, 5.0), (2, 2.0, 7.0), (3, 0.0, 10.0)] {
+        it.set_mode(mode);
+        it.set(MODE_REAL, twin);
+        assert_eq!(
+            it.step(sum_time(&it), 0.1),
+            Status::Ok,
+            "{}",
+            it.last_message()
+        );
+        assert_eq!(it.real(LATE[0]), sum, "mode {mode}, mode_real {twin}");
+    }
+}
+
+/// The present time of an instance with ticks of 0.1.
+fn sum_time(it: &Instance) -> f64 {
+    let mut time = f64::NAN;
+    let kind = fmu_abi::types::LAST_SUCCESSFUL_TIME;
+    assert_eq!(
+        unsafe { fmi2GetRealStatus(it.c, kind, &mut time) },
+        Status::Ok
+    );
+    time
+}
+
+#[test]
+fn a_mode_and_its_twin_that_disagree_are_refused_by_both_names() {
+    let it = started();
+    it.set(INPUT[0], 1.0);
+    for (mode, twin) in [(1, 2.0), (3, 1.0), (1, 1.5), (7, 1.0)] {
+        let before = it.bits();
+        it.set_mode(mode);
+        it.set(MODE_REAL, twin);
+        assert_eq!(it.step(0.0, 0.1), Status::Error);
+        for words in [format!("mode is {mode}"), format!("mode_real is {twin}")] {
+            assert!(it.last_message().contains(&words), "{}", it.last_message());
+        }
+        it.set(MODE_REAL, 0.0);
+        it.set_mode(1);
+        assert_eq!(it.bits(), before);
+    }
+    assert_eq!(it.step(0.0, 0.1), Status::Ok);
+}
+
+#[test]
+fn a_mode_that_is_not_told_is_waited_for() {
+    let it = Instance::new(&Resources::new(0.1));
+    it.set_mode(0);
+    it.set(REFERENCE, 4.0);
+    it.set(INPUT[0], 1.0);
+    it.start(0.0);
+    for k in 0..7 {
+        assert_eq!(
+            it.step(f64::from(k) * 0.1, 0.1),
+            Status::Ok,
+            "{}",
+            it.last_message()
+        );
+        assert_eq!((it.real(LATE[0]), it.ticks()), (4.0, 0));
+    }
+    // The eighth tick has begun when the mode is told.
+    assert_eq!(it.step(0.7, 0.05), Status::Ok);
+    let copy = Instance::new(&Resources::new(0.1));
+    let (status, state) = copy.deserialize(&it.serialize(it.save()));
+    assert_eq!(status, Status::Ok, "that it waits is part of a saved state");
+    assert_eq!(unsafe { fmi2SetFMUstate(copy.c, state) }, Status::Ok);
+    for it in [&it, &copy] {
+        it.set_mode(2);
+        assert_eq!(it.step(0.75, 0.05), Status::Ok);
+        assert_eq!((it.real(LATE[0]), it.ticks()), (4.0, 0));
+        assert_eq!(it.step(0.8, 0.1), Status::Ok);
+        assert_eq!(
+            (it.real(LATE[0]), it.ticks()),
+            (6.0, 1),
+            "begun anew, then one tick"
+        );
+        it.set_mode(0);
+        assert_eq!(it.step(0.9, 0.1), Status::Error);
+        assert!(
+            it.last_message().contains("mode is 0"),
+            "{}",
+            it.last_message()
+        );
+        it.set_mode(3);
+        assert_eq!(it.step(0.9, 0.1), Status::Ok);
+    }
+    assert_eq!(it.warnings().len(), 1, "{:?}", it.warnings());
+    assert!(it.warnings()[0].contains("mode is 0, not told yet"));
+}
+
+#[test]
+fn tunable_parameters_keep_to_their_range() {
+    let it = started();
+    it.set(GAIN, 3.0);
+    for bad in [-10.5, 1e300, f64::NAN, f64::INFINITY] {
+        let references = [INPUT[0], GAIN];
+        let values = [5.0, bad];
+        let status = unsafe { fmi2SetReal(it.c, references.as_ptr(), 2, values.as_ptr()) };
+        assert_eq!(status, Status::Error);
+        let message = it.last_message();
+        assert!(message.contains(&format!("gain is {bad}")), "{message}");
+        assert!(message.contains("from -10 to 10"), "{message}");
+        assert_eq!((it.real(INPUT[0]), it.real(GAIN)), (0.0, 3.0));
+    }
+    for good in [-10.0, 10.0] {
+        assert_eq!(it.set(GAIN, good), Status::Ok);
+    }
 }
 
 #[test]
@@ -285,19 +384,13 @@ fn an_impossible_input_is_named_and_the_instance_goes_on() {
 #[test]
 fn an_input_that_is_not_ready_in_initialization_mode_may_come_later() {
     let it = Instance::new(&Resources::new(0.1));
-    it.set_mode(0);
+    it.set_mode(5);
     it.set(REFERENCE, 4.0);
     it.start(0.0);
-    let warned = it.messages.lock().unwrap()[..]
-        .iter()
-        .filter(|(status, category, _)| {
-            (*status, category.as_str()) == (Status::Warning, "logStatusWarning")
-        })
-        .count();
-    assert_eq!(warned, 1);
+    assert_eq!(it.warnings().len(), 1);
     assert_eq!(it.real(LATE[0]), 4.0);
     assert_eq!(it.step(0.0, 0.1), Status::Error);
-    assert!(it.last_message().contains("fmi2DoStep: mode is 0"));
+    assert!(it.last_message().contains("fmi2DoStep: mode is 5"));
     it.set_mode(2);
     it.set(REFERENCE, 5.0);
     it.set(INPUT[0], 1.0);

@@ -1,4 +1,6 @@
 //! Masters initialize one FMU after the other: an input may not be ready when its turn comes.
+//!
+//! promise: untold-mode
 
 use fmu_host::model::example;
 use fmu_host::types::Status;
@@ -75,10 +77,11 @@ fn an_unknown_mode_starts_in_the_nearest_with_a_warning() {
             let known = [1, 2].contains(&number);
             assert_eq!(warnings(it).len(), usize::from(!known), "{mode} = {number}");
             for text in warnings(it) {
+                let why = if number == 0 { "not told" } else { "1 to 2" };
                 for word in [
                     "fmi2ExitInitializationMode",
                     &format!("{mode} is {number}"),
-                    "1 to 2",
+                    why,
                 ] {
                     assert!(text.contains(word), "{text}");
                 }
@@ -103,8 +106,6 @@ fn a_mode_that_comes_late_is_as_good_as_one_that_came_in_time() {
         // That the start is provisional is part of a saved state.
         assert_eq!(copy.restore(copy.read_bytes(&late.bytes())), Status::Ok);
         for it in [late, copy] {
-            assert_eq!(it.step(0.0, 0.5), Status::Error);
-            assert!(it.last_message().contains(&format!("{mode} is 0")));
             assert_eq!(it.set_integer(it.span(mode), 2), Status::Ok);
         }
         let slopes = [late, copy, in_time].map(|it| {
@@ -138,5 +139,32 @@ fn what_is_no_number_is_still_refused_in_initialization_mode() {
         let status = unsafe { (it.functions().exit_initialization_mode)(it.c) };
         assert_eq!(status, Status::Error);
         assert!(it.last_message().contains(&format!("{name}[1] is NaN")));
+    }
+}
+
+#[test]
+fn a_mode_that_is_not_told_is_waited_for() {
+    for side in sides(2) {
+        let (mode, shown) = (side.mode, side.shown);
+        let [waiting, at_rest] = &side.made[..] else {
+            unreachable!()
+        };
+        initialize(waiting, mode, 0);
+        initialize(at_rest, mode, 1);
+        let rest = at_rest.get(shown);
+        let moving = if mode == "mode" { "y" } else { "u" };
+        for k in 0..5 {
+            let status = waiting.set(waiting.span(moving), &[1.0 + f64::from(k), 2.0]);
+            assert_eq!(status, Status::Ok);
+            assert_eq!(waiting.step(f64::from(k), 1.0), Status::Ok);
+            assert_eq!(waiting.get(shown), rest, "tick {k}");
+        }
+        let real = waiting.span(&format!("{mode}_real"));
+        assert_eq!(waiting.set(real, &[2.0]), Status::Ok);
+        for k in 5..8 {
+            assert_eq!(waiting.step(f64::from(k), 1.0), Status::Ok);
+        }
+        assert_ne!(waiting.get(shown), rest);
+        assert_eq!(warnings(waiting).len(), 1, "{:?}", warnings(waiting));
     }
 }

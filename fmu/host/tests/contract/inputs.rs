@@ -1,4 +1,6 @@
 //! Inputs that make no sense: handled or refused by name, and the instance goes on.
+//!
+//! promise: finite-plant
 
 use crate::Pair;
 use fmu_host::Coupling::GaussSeidel;
@@ -102,11 +104,18 @@ fn a_mode_that_is_none_is_refused_by_name() {
     for bad in [0, 3, -1, i32::MAX, i32::MIN] {
         let spoil = |it: &Instance| assert_eq!(it.set_integer(mode, bad), Status::Ok);
         let mend = |it: &Instance| assert_eq!(it.set_integer(mode, 1), Status::Ok);
-        refused(it, spoil, mend, &["mode is", &bad.to_string(), "1 to 2"]);
+        let which = if bad == 0 { "not told" } else { "1 to 2" };
+        refused(it, spoil, mend, &["mode is", &bad.to_string(), which]);
     }
     for bad in [1.5, 3.0, -1.0, f64::NAN, 1e300] {
-        let spoil = |it: &Instance| assert_eq!(it.set(real, &[bad]), Status::Ok);
-        let mend = |it: &Instance| assert_eq!(it.set(real, &[0.0]), Status::Ok);
+        let spoil = |it: &Instance| {
+            assert_eq!(it.set(real, &[bad]), Status::Ok);
+            assert_eq!(it.set_integer(mode, 0), Status::Ok);
+        };
+        let mend = |it: &Instance| {
+            assert_eq!(it.set(real, &[0.0]), Status::Ok);
+            assert_eq!(it.set_integer(mode, 1), Status::Ok);
+        };
         refused(
             it,
             spoil,
@@ -114,6 +123,9 @@ fn a_mode_that_is_none_is_refused_by_name() {
             &["mode_real is", &bad.to_string(), "1 to 2"],
         );
     }
+    let spoil = |it: &Instance| assert_eq!(it.set(real, &[2.0]), Status::Ok);
+    let mend = |it: &Instance| assert_eq!(it.set(real, &[0.0]), Status::Ok);
+    refused(it, spoil, mend, &["mode is 1", "mode_real is 2"]);
 }
 
 #[test]
@@ -132,14 +144,104 @@ fn the_mode_may_come_as_a_real() {
         assert_eq!(other.plant.get_into(from, &mut mode), Status::Ok);
         assert_eq!(other.controller.set(to, &mode), Status::Ok);
         assert_eq!(
-            other.controller.set_integer(integer, 7),
+            other.controller.set_integer(integer, 0),
             Status::Ok,
-            "not looked at"
+            "not connected"
         );
         assert_eq!(other.controller.step(f64::from(k), 1.0), Status::Ok);
         other.act();
         assert_eq!(other.plant.step(f64::from(k), 1.0), Status::Ok);
         other = other.at(f64::from(k + 1));
         assert_eq!(other.bits(), closed.bits());
+    }
+}
+
+/// What the plant reads when a tick ends is looked at then.
+#[test]
+fn the_plant_publishes_nothing_that_is_not_finite() {
+    let pair = Pair::load();
+    let closed = running(&pair);
+    let it = &closed.plant;
+    let outputs = || -> Vec<f64> {
+        let names = ["y", "y_true", "x", "y_ref", "mode_real", "f", "w"];
+        names.iter().flat_map(|name| it.get(name)).collect()
+    };
+    let (disturbance, fault) = (it.span("w_ext"), it.span("f_ext"));
+    for bad in [f64::INFINITY, f64::NEG_INFINITY, f64::NAN] {
+        let saved = it.save();
+        assert_eq!(it.step(60.0, 0.5), Status::Ok);
+        let before = outputs();
+        assert_eq!(it.set(disturbance, &[bad]), Status::Ok);
+        assert_eq!(it.step(60.5, 0.5), Status::Error);
+        let message = it.last_message();
+        assert!(message.contains(&format!("w_ext[1] is {bad}")), "{message}");
+        assert_eq!(outputs(), before);
+        assert_eq!(it.set(disturbance, &[0.0]), Status::Ok);
+        assert_eq!(it.step(60.5, 0.5), Status::Ok);
+        // A fault that is no number is a sensor that says none: y alone shows it.
+        assert_eq!(it.set(fault, &[bad]), Status::Ok);
+        assert_eq!(it.step(61.0, 1.0), Status::Ok);
+        assert!(!it.get("y")[0].is_finite() && it.get("y")[1].is_finite());
+        for name in ["y_true", "x", "y_ref", "mode_real", "f", "w"] {
+            assert!(it.get(name).iter().all(|value| value.is_finite()), "{name}");
+        }
+        assert_eq!(it.set(fault, &[0.0]), Status::Ok);
+        assert_eq!(it.restore(saved), Status::Ok);
+    }
+    // Numbers that are finite, and whose sums and products are not.
+    for (span, name) in [
+        (disturbance, "w_ext"),
+        (fault, "f_ext"),
+        (it.span("u"), "u"),
+    ] {
+        let saved = it.save();
+        for (k, huge) in [f64::MAX, f64::MIN, 1e200, f64::MAX]
+            .into_iter()
+            .enumerate()
+        {
+            assert_eq!(it.set(span, &[huge]), Status::Ok);
+            assert_eq!(it.step(60.0 + k as f64, 1.0), Status::Ok);
+            assert!(
+                outputs().iter().all(|value| value.is_finite()),
+                "{name} {huge}: {:?}",
+                outputs()
+            );
+        }
+        assert_eq!(it.set(span, &[0.0]), Status::Ok);
+        assert_eq!(it.restore(saved), Status::Ok);
+    }
+}
+
+/// Readings that are held within a step are not repeated by the sensor.
+#[test]
+fn held_readings_accuse_no_sensor() {
+    let mut design = fmu_host::model::example();
+    design.controller.estimator.stuck_after = 3;
+    let model = fmu_host::Model::controller(&design);
+    let library = fmu_host::Library::load("ftc_controller");
+    for (step, set_anew, stuck) in [(1.0, true, true), (25.0, true, false), (1.0, false, false)] {
+        let it = Instance::new(library.functions, &model).unwrap();
+        it.initialize(0.0, |it| {
+            assert_eq!(it.set_integer(it.span("mode"), 1), Status::Ok)
+        });
+        let (y, flags) = (it.span("y"), it.span("fault"));
+        for k in 0..8 {
+            let reading = if step > 1.0 {
+                1e-3 * f64::from(k)
+            } else {
+                1e-3
+            };
+            if k == 0 || set_anew {
+                assert_eq!(it.set(y, &[reading, -reading]), Status::Ok);
+            }
+            assert_eq!(it.step(f64::from(k) * step, step), Status::Ok);
+        }
+        let flagged = [0, 1].map(|sensor| it.boolean(flags, sensor));
+        assert_eq!(flagged, [stuck; 2], "step {step}, set anew {set_anew}");
+        let twins: Vec<f64> = flagged
+            .iter()
+            .map(|&raised| f64::from(u8::from(raised)))
+            .collect();
+        assert_eq!(it.get("fault_real"), twins);
     }
 }

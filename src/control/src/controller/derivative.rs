@@ -6,7 +6,8 @@
 //! dr = dy     df_hat = D dr     dy_c = dy - df_hat     dx_hat = H dy_c     du = K dx_hat + N dy_ref
 //! ```
 //!
-//! and a bumpless switch adds `G dZ`, the printed additive control `-K C^+ df_hat`. Flags, lost
+//! and the printed additive control adds `-K C^+ df_hat`; a bumpless switch repeats the last command,
+//! whatever the sample. Flags, lost
 //! sensors and inputs at their limits do not move. Through the integrators a reference acts from
 //! the next tick on: of this tick's outputs it moves the command alone, by the feedforward.
 
@@ -46,7 +47,7 @@ impl Controller {
         trial
             .observer
             .differentiate(observer, left, mode, corrected);
-        self.differentiate_command(trial, left, mode, sample.compensate, change.reference);
+        self.differentiate_command(trial, mode, sample.compensate, change.reference);
     }
 
     /// `dy_c`, where the measurement is one.
@@ -78,7 +79,6 @@ impl Controller {
     fn differentiate_command(
         &self,
         trial: &mut ControllerState,
-        left: usize,
         mode: usize,
         compensate: Compensate<'_>,
         reference: &[f64],
@@ -91,17 +91,8 @@ impl Controller {
         change.fill(0.0);
         kernel::add_product(change, &gains.state_feedback, estimate);
         kernel::add_product(change, &gains.feedforward, reference);
-        if left != mode && self.parameters.feedback.bumpless {
-            // The integral part takes up what the estimate would have moved.
-            trial.deviation.fill(0.0);
-            kernel::add_scaled(&mut trial.deviation, -1.0, change);
-            trial.integral.fill(0.0);
-            kernel::add_product(
-                &mut trial.integral,
-                &gains.integral_inverse,
-                &trial.deviation,
-            );
-            kernel::add_product(change, &gains.integral, &trial.integral);
+        if self.parameters.feedback.transfer.is_some() && trial.since == 0 {
+            change.fill(0.0);
         }
         if trial.additive.is_some() && compensate == Compensate::Estimate {
             trial.substitute.fill(0.0);

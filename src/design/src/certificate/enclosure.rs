@@ -100,6 +100,59 @@ impl Enclosure {
         whole
     }
 
+    /// The matrix with these blocks, row by row; the blocks of a row are equally high, and every row
+    /// is equally wide.
+    pub fn blocks(rows: &[Vec<&Self>]) -> Self {
+        let heights = rows
+            .iter()
+            .map(|row| row.first().map_or(0, |b| b.shape().0));
+        let widths = rows
+            .iter()
+            .map(|row| row.iter().map(|block| block.shape().1).sum());
+        let mut whole = Self::zeros(heights.sum(), widths.max().unwrap_or(0));
+        let mut below = 0;
+        for row in rows {
+            let mut right = 0;
+            for block in row {
+                let at = (below, right);
+                whole.mid.view_mut(at, block.shape()).copy_from(&block.mid);
+                whole.rad.view_mut(at, block.shape()).copy_from(&block.rad);
+                right += block.shape().1;
+            }
+            below += row.first().map_or(0, |block| block.shape().0);
+        }
+        whole
+    }
+
+    /// The rows from `first` on, `count` of them.
+    pub fn rows(&self, first: usize, count: usize) -> Self {
+        Self {
+            mid: self.mid.rows(first, count).into_owned(),
+            rad: self.rad.rows(first, count).into_owned(),
+        }
+    }
+
+    /// Each row and each column multiplied by a power of two.
+    pub fn in_units(&self, rows: &[f64], columns: &[f64]) -> Self {
+        let scaled = |matrix: &DMatrix<f64>, floor: f64| {
+            DMatrix::from_fn(matrix.nrows(), matrix.ncols(), |r, c| {
+                matrix[(r, c)] * (rows[r] * columns[c]) + floor
+            })
+        };
+        Self {
+            mid: scaled(&self.mid, 0.0),
+            rad: scaled(&self.rad, 2.0 * UNDERFLOW),
+        }
+    }
+
+    /// The negative of every member.
+    pub fn negative(&self) -> Self {
+        Self {
+            mid: -&self.mid,
+            rad: self.rad.clone(),
+        }
+    }
+
     /// Whether every symmetric matrix in the enclosure is positive definite: `true` is a proof,
     /// `false` says nothing.
     ///
@@ -192,10 +245,6 @@ impl Sub for &Enclosure {
 
     /// Contains every difference of members.
     fn sub(self, other: &Enclosure) -> Enclosure {
-        let negative = Enclosure {
-            mid: -&other.mid,
-            rad: other.rad.clone(),
-        };
-        self + &negative
+        self + &other.negative()
     }
 }

@@ -3,7 +3,7 @@
 use crate::augmented::scaled;
 use crate::pseudo_inverse;
 use ftc_plant::{Mode, SwitchedPlant};
-use nalgebra::{Complex, DMatrix};
+use nalgebra::DMatrix;
 
 /// Singular values below this fraction of the largest count as zero.
 const RANK_TOLERANCE: f64 = 1e-10;
@@ -101,27 +101,30 @@ fn rank(matrix: &DMatrix<f64>) -> usize {
         .count()
 }
 
-/// Whether every eigenvalue of `a` that does not decay as fast as `decay` shows in `c a^k`, by the
-/// rank of `[lambda I - A; C]` (Popov, Belevitch, Hautus).
+/// Whether a state disturbance is decoupled: `(I - H_ij C_j) E_i` vanishes up to rounding.
 ///
 /// # Errors
-/// The magnitude of the eigenvalue that no gain can move.
-pub(super) fn check_detectable(a: &DMatrix<f64>, c: &DMatrix<f64>, decay: f64) -> Result<(), f64> {
-    let n = a.nrows();
-    for lambda in a.complex_eigenvalues().iter() {
-        if lambda.norm() < decay {
-            continue;
-        }
-        let pencil = DMatrix::from_fn(n + c.nrows(), n, |r, k| match r < n {
-            true => {
-                let diagonal = if r == k { *lambda } else { Complex::ZERO };
-                diagonal - a[(r, k)]
+/// One sentence that names the modes for which it does not.
+pub(crate) fn check_decoupling(
+    plant: &SwitchedPlant,
+    design: &super::ObserverDesign,
+) -> Result<(), String> {
+    let units = PerUnit {
+        states: &design.certificate.states,
+        outputs: &design.certificate.outputs,
+    };
+    for (i, left) in plant.modes.iter().enumerate() {
+        for (j, entered) in plant.modes.iter().enumerate() {
+            let e = units.e(left);
+            let h = units.h(&design.observer.decoupling[i][j].0);
+            let through = &e - &h * (units.c(entered) * &e);
+            if through.amax() > 1e-9 * h.amax().max(1.0) {
+                return Err(format!(
+                    "the observer does not decouple the disturbance from mode {} to mode {}: export the design again",
+                    i + 1,
+                    j + 1
+                ));
             }
-            false => Complex::from(c[(r - n, k)]),
-        });
-        let values = pencil.singular_values();
-        if values.min() <= 1e-9 * values.max() {
-            return Err(lambda.norm());
         }
     }
     Ok(())

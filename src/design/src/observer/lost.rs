@@ -14,6 +14,8 @@ use crate::certificate::{
 };
 use crate::lyapunov::all_pairs;
 use crate::verdict::BlockKind;
+#[cfg(feature = "solver")]
+use ftc_control::parameters::Observer;
 use ftc_control::parameters::{Gain, LostSet, ObserverKind};
 use ftc_plant::SwitchedPlant;
 use nalgebra::DMatrix;
@@ -215,6 +217,15 @@ pub(crate) fn changes(
         }
     }
     found
+}
+
+/// Whether every gain for lost sensors is finite.
+#[cfg(feature = "solver")]
+pub(crate) fn gains_fit(observer: &Observer) -> bool {
+    let gains = observer.lost.iter().flat_map(|set| &set.correction);
+    gains
+        .into_iter()
+        .all(|gain| gain.0.iter().all(|value| value.is_finite()))
 }
 
 /// Everything [`verify`] indexes has the size it must have.

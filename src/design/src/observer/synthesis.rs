@@ -1,6 +1,7 @@
 //! The road from a plant to a certified observer.
 
-use super::existence::{PerUnit, check_detectable, decoupling};
+use super::detectable::check_detectable;
+use super::existence::{PerUnit, decoupling};
 use super::kalman::Filtered;
 use super::lost_synthesis::{self, Demand, blended, common_function};
 use super::{ObserverCertificate, ObserverDesign};
@@ -379,6 +380,65 @@ fn filters(plant: &SwitchedPlant, spec: &ObserverSpec, units: &OwnedUnits) -> Ve
         .collect()
 }
 
+/// An observer in the running, with what is known of it before it is proved.
+pub(crate) struct Candidate {
+    /// The observer; of a filter, before it is moved to where its decay can be proved.
+    pub observer: Observer,
+    /// Ratio of the noises it was made for, or that filters beside it are made for.
+    pub ratio: f64,
+    /// The proved design, where there is one already.
+    ready: Option<ObserverDesign>,
+}
+
+impl Candidate {
+    fn ready(design: ObserverDesign) -> Self {
+        Self {
+            observer: design.observer.clone(),
+            ratio: USUAL_RATIO,
+            ready: Some(design),
+        }
+    }
+
+    /// The Kalman filter of a ratio; `None` where it does not exist.
+    fn filter(filters: &[Filtered], units: &OwnedUnits, ratio: f64) -> Option<Self> {
+        let gains = filters.iter().map(|filter| filter.gain(&[], ratio));
+        let physical = |gain: DMatrix<f64>| Gain(units.physical(&gain));
+        let gains: Vec<Gain> = gains
+            .map(|gain| gain.map(physical))
+            .collect::<Option<_>>()?;
+        let none = DMatrix::zeros(filters[0].a.nrows(), filters[0].c.nrows());
+        Some(Self {
+            observer: Observer {
+                kind: ObserverKind::Kalman,
+                note: None,
+                gains: vec![Gain(none); filters.len()],
+                decoupling: vec![gains; filters.len()],
+                lost: Vec::new(),
+                minimum_dwell: 0,
+            },
+            ratio,
+            ready: None,
+        })
+    }
+
+    /// The observer, proved; a filter is first moved to where its decay can be.
+    ///
+    /// # Errors
+    /// The asked decay cannot be proved of it.
+    pub fn proved(
+        &self,
+        plant: &SwitchedPlant,
+        spec: &ObserverSpec,
+        scaling: &Scaling,
+    ) -> Result<ObserverDesign, DesignError> {
+        match &self.ready {
+            Some(design) => Ok(design.clone()),
+            None => kalman(plant, spec, &units(scaling), self.ratio)
+                .ok_or_else(|| SolverFailure::NumericalTrouble.into()),
+        }
+    }
+}
+
 /// The Kalman filter of this ratio of noises, moved towards faster decay where the filter itself does
 /// not decay as asked, and proved; `None` where there is none.
 fn kalman(
@@ -437,41 +497,38 @@ fn with_functions(
     Some((gains, matrices))
 }
 
-/// The Kalman filters of the usual ratios of noises that decay as asked, and, where asked for and where
-/// it exists, the unknown input observer.
+/// The Kalman filters of the usual ratios of noises and, where it exists and nothing speaks against
+/// it, the unknown input observer; or the one observer that is asked for.
 ///
 /// # Errors
-/// Where there is none of them: why there is no observer at all.
+/// No observer decays as asked; the error says why and what would help.
 pub(crate) fn candidates(
     plant: &SwitchedPlant,
     spec: &ObserverSpec,
     scaling: &Scaling,
-) -> Result<Vec<(ObserverDesign, f64)>, DesignError> {
+) -> Result<Vec<Candidate>, DesignError> {
     Dimensions::check(plant).map_err(DesignError::Request)?;
     spec.check().map_err(DesignError::Request)?;
-    let only = |found: Result<ObserverDesign, DesignError>| {
-        found.map(|observer| vec![(observer, USUAL_RATIO)])
-    };
-    let mut found: Vec<(ObserverDesign, f64)> = Vec::new();
+    let only =
+        |found: Result<ObserverDesign, DesignError>| found.map(|o| vec![Candidate::ready(o)]);
     match spec.kind {
         ObserverChoice::Uio => return only(unknown_input(plant, spec, scaling)),
         ObserverChoice::Luenberger => return only(luenberger(plant, spec, scaling, None)),
-        ObserverChoice::Auto if reason_against(plant).is_none() => {
-            let decoupled = unknown_input(plant, spec, scaling);
-            found.extend(decoupled.map(|observer| (observer, USUAL_RATIO)));
-        }
         ObserverChoice::Auto | ObserverChoice::Kalman => {}
     }
     let units = units(scaling);
-    let ratios = RATIOS
-        .iter()
-        .map(|&ratio| (kalman(plant, spec, &units, ratio), ratio));
-    found.extend(ratios.filter_map(|(observer, ratio)| Some((observer?, ratio))));
-    match found.is_empty() {
-        // The same conditions of existence, with their names.
-        true => only(luenberger(plant, spec, scaling, None)),
-        false => Ok(found),
+    // Whether any filter decays as asked: one of them tells for all.
+    if kalman(plant, spec, &units, USUAL_RATIO).is_none() {
+        return only(luenberger(plant, spec, scaling, None));
     }
+    let filters = filters(plant, spec, &units);
+    let of = |&ratio: &f64| Candidate::filter(&filters, &units, ratio);
+    let mut found: Vec<Candidate> = RATIOS.iter().filter_map(of).collect();
+    if spec.kind == ObserverChoice::Auto && reason_against(plant).is_none() {
+        let decoupled = unknown_input(plant, spec, scaling);
+        found.extend(decoupled.ok().map(Candidate::ready));
+    }
+    Ok(found)
 }
 
 /// The observer with gains for every set of lost sensors that can be served and proved.

@@ -27,7 +27,7 @@ pub fn additive(design: &Design) -> Result<ControllerParameters, DesignError> {
     parameters.feedback = feedback(
         &control,
         plant,
-        ours.bumpless,
+        synthesis.running_loop.transfer.as_ref(),
         ours.has_feedforward(),
         &parameters.input_limits,
     );

@@ -1,0 +1,296 @@
+//! Whether everything that decides what the controller does follows from what is proved.
+//!
+//! What the inequalities say nothing about is derived again from the plant and the certified gains, or
+//! held against a relation that it must satisfy. [`UNCOVERED`] names what is left.
+
+use crate::assembly;
+use crate::harmonics;
+use crate::observer::{check_decoupling, lost_gains_fit};
+use crate::{Design, Synthesis};
+use ftc_control::parameters::{Estimator, FeedbackGains, ObserverKind};
+use nalgebra::DMatrix;
+
+/// How far a number may lie from what it is derived to be, relative to the largest of its kind:
+/// rounding on another machine, and no more.
+const TOLERANCE: f64 = 1e-9;
+
+/// The farthest an operating point may lie from zero, in nominal values of its signal.
+const FARTHEST: f64 = 1e6;
+
+/// The largest threshold, in nominal values of its output.
+const LARGEST_THRESHOLD: f64 = 1e3;
+
+/// Numbers of a design that `verify` holds against bounds only, in words for its report.
+pub const UNCOVERED: [&str; 4] = [
+    "the values of the operating points (any are admissible: the claims are about deviations from them)",
+    "the coefficients of the fault estimator's predictors and its thresholds, debounce and learning (the claims hold \
+     while no estimate is taken out of the loop)",
+    "whether gamma is the least possible",
+    "the machine code of the binaries",
+];
+
+/// Derives again what can be, and checks the rest against its relations.
+///
+/// # Errors
+/// One sentence that names the first part that does not follow.
+pub fn check(design: &Design) -> Result<(), String> {
+    let synthesis = design
+        .synthesis
+        .as_ref()
+        .ok_or("resources/design.json holds no proof: export the design again")?;
+    check_feedback(design, synthesis)?;
+    check_observer(design, synthesis)?;
+    check_operating_points(design)?;
+    check_limits(design)?;
+    check_estimator(design)?;
+    check_report(synthesis)
+}
+
+fn differs(what: &str) -> String {
+    format!("{what} of the controller does not follow from what is proved: export the design again")
+}
+
+/// The first condition that fails.
+fn all(conditions: &[(bool, &str)]) -> Result<(), String> {
+    match conditions.iter().find(|(holds, _)| !holds) {
+        Some((_, what)) => Err(differs(what)),
+        None => Ok(()),
+    }
+}
+
+/// Whether two matrices agree up to rounding.
+fn close(found: &DMatrix<f64>, derived: &DMatrix<f64>) -> bool {
+    found.shape() == derived.shape()
+        && found
+            .iter()
+            .zip(derived.iter())
+            .all(|(f, d)| (f - d).abs() <= TOLERANCE * derived.amax())
+}
+
+fn check_feedback(design: &Design, synthesis: &Synthesis) -> Result<(), String> {
+    let (running, proved) = (&design.controller.feedback, &synthesis.state_feedback);
+    let plant = &design.controller.plant;
+    all(&[
+        (
+            running.tracked == proved.spec.tracked,
+            "the choice of tracked outputs",
+        ),
+        (running.latency == proved.spec.latency, "the latency"),
+        (
+            running.resonators == proved.spec.resonators,
+            "the internal model",
+        ),
+        (
+            running.modes.len() == proved.modes.len(),
+            "the number of modes",
+        ),
+    ])?;
+    let limits = &design.controller.input_limits;
+    let derived = assembly::feedback(
+        proved,
+        plant,
+        synthesis.running_loop.transfer.as_ref(),
+        running.has_feedforward(),
+        limits,
+    );
+    all(&[(running.transfer == derived.transfer, "bumpless transfer")])?;
+    for (mode, (runs, gains)) in running.modes.iter().zip(&derived.modes).enumerate() {
+        check_gains(mode, runs, gains)?;
+    }
+    Ok(())
+}
+
+fn check_gains(mode: usize, runs: &FeedbackGains, derived: &FeedbackGains) -> Result<(), String> {
+    let exact = [
+        (
+            &runs.state_feedback,
+            &derived.state_feedback,
+            "the state feedback",
+        ),
+        (&runs.integral, &derived.integral, "the integral gain"),
+        (
+            &runs.previous_input,
+            &derived.previous_input,
+            "the gain of the previous input",
+        ),
+    ];
+    let rounded = [
+        (&runs.feedforward, &derived.feedforward, "the feedforward"),
+        (
+            &runs.anti_windup,
+            &derived.anti_windup,
+            "the anti-windup gain",
+        ),
+        (
+            &runs.output_feedback,
+            &derived.output_feedback,
+            "the gain of the additive control",
+        ),
+    ];
+    let exact = exact.iter().find(|(runs, derived, _)| runs != derived);
+    let rounded = rounded
+        .iter()
+        .find(|(runs, derived, _)| !close(runs, derived));
+    match exact.or(rounded) {
+        Some((.., what)) => Err(differs(&format!("mode {}: {what}", mode + 1))),
+        None => Ok(()),
+    }
+}
+
+fn check_observer(design: &Design, synthesis: &Synthesis) -> Result<(), String> {
+    let observer = &design.controller.observer;
+    all(&[
+        (*observer == synthesis.observer.observer, "the observer"),
+        (lost_gains_fit(observer), "the gains for lost sensors"),
+    ])?;
+    match observer.kind {
+        ObserverKind::Uio => check_decoupling(&design.controller.plant, &synthesis.observer),
+        ObserverKind::Luenberger | ObserverKind::Kalman => Ok(()),
+    }
+}
+
+fn check_operating_points(design: &Design) -> Result<(), String> {
+    let signals = &design.signals;
+    for (mode, described) in design.controller.plant.modes.iter().enumerate() {
+        let point = &described.operating_point;
+        let parts = [
+            (&point.x, &signals.states, "state"),
+            (&point.u, &signals.inputs, "input"),
+            (&point.y, &signals.outputs, "output"),
+        ];
+        for (values, signals, what) in parts {
+            let near = values
+                .iter()
+                .zip(signals)
+                .all(|(value, signal)| value.abs() <= FARTHEST * signal.nominal);
+            if !near {
+                return Err(differs(&format!(
+                    "the operating {what} of mode {}",
+                    mode + 1
+                )));
+            }
+        }
+        let limits = point.u.iter().zip(&design.controller.input_limits);
+        let mut inside = limits.map(|(&u, limit)| limit.clamp(u) == u);
+        if !inside.all(|inside| inside) {
+            return Err(differs(&format!(
+                "the operating input of mode {}, which lies beyond its limits,",
+                mode + 1
+            )));
+        }
+    }
+    Ok(())
+}
+
+fn check_limits(design: &Design) -> Result<(), String> {
+    let inputs = &design.signals.inputs;
+    let outputs = &design.signals.outputs;
+    let limits = design.controller.input_limits.iter().zip(inputs);
+    let described = limits
+        .clone()
+        .all(|(l, input)| l.min == input.min && l.max == input.max);
+    let ordered = limits.clone().all(|(l, _)| match (l.min, l.max) {
+        (Some(min), Some(max)) => min < max,
+        _ => true,
+    });
+    let estimator = &design.controller.estimator;
+    let faults = assembly::largest_faults(outputs);
+    all(&[
+        (described && ordered, "a limit"),
+        (estimator.largest_fault == faults, "the largest fault"),
+    ])
+}
+
+fn check_estimator(design: &Design) -> Result<(), String> {
+    let estimator = &design.controller.estimator;
+    let outputs = &design.signals.outputs;
+    let threshold =
+        |(&value, nominal): (&f64, f64)| value > 0.0 && value <= LARGEST_THRESHOLD * nominal;
+    let thresholds = estimator
+        .thresholds
+        .iter()
+        .zip(outputs.iter().map(|o| o.nominal));
+    all(&[
+        (thresholds.clone().all(threshold), "a threshold"),
+        (
+            estimator.leverage_limit == assembly::LEVERAGE_LIMIT,
+            "the limit of the leverage",
+        ),
+        (estimator.predictors.iter().all(plausible), "a predictor"),
+        (transfers_fit(design, estimator), "a transfer of harmonics"),
+    ])
+}
+
+/// Finite, a regular triangular factor, deviations that are none or positive.
+fn plausible(predictor: &ftc_control::parameters::Predictor) -> bool {
+    let factor = &predictor.factor;
+    let regular = (0..factor.nrows()).all(|k| factor[(k, k)] != 0.0);
+    let triangular =
+        (0..factor.ncols()).all(|c| (c + 1..factor.nrows()).all(|r| factor[(r, c)] == 0.0));
+    let finite = |value: &f64| value.is_finite() && value.abs() < 1e12;
+    regular
+        && triangular
+        && predictor.response.iter().chain(factor.iter()).all(finite)
+        && predictor.deviation.iter().all(|d| (0.0..1e12).contains(d))
+}
+
+/// What a response learned in one mode tells of another follows from the plant.
+fn transfers_fit(design: &Design, estimator: &Estimator) -> bool {
+    let derived = match &estimator.harmonics {
+        Some(known) if known.period > 0.0 && known.count > 0 && known.count < 100 => {
+            let plant = &design.controller.plant;
+            harmonics::transfers(plant, known.period * plant.sample_time, known.count)
+        }
+        Some(_) => return false,
+        None => Vec::new(),
+    };
+    let maps = |transfers: &[Vec<Vec<ftc_control::parameters::PhasorMap>>]| {
+        transfers
+            .iter()
+            .flatten()
+            .flatten()
+            .cloned()
+            .collect::<Vec<_>>()
+    };
+    let (found, derived) = (maps(&estimator.harmonic_transfers), maps(&derived));
+    found.len() == derived.len()
+        && found.iter().zip(&derived).all(|(f, d)| {
+            let largest = d.real.amax().max(d.imaginary.amax());
+            let near = |a: &DMatrix<f64>, b: &DMatrix<f64>| {
+                a.shape() == b.shape() && (a - b).amax() <= 1e-7 * largest
+            };
+            near(&f.real, &d.real) && near(&f.imaginary, &d.imaginary)
+        })
+}
+
+/// Figures that are reported beside the claims agree with the gains.
+fn check_report(synthesis: &Synthesis) -> Result<(), String> {
+    let control = &synthesis.state_feedback;
+    let bounded = |radii: &[f64], decay: f64| {
+        radii
+            .iter()
+            .all(|r| (0.0..=decay * (1.0 + 1e-9)).contains(r))
+    };
+    let optimum = match (&control.optimum, &control.gamma) {
+        (Some(optimum), Some(gamma)) => {
+            optimum.len() == gamma.len()
+                && optimum
+                    .iter()
+                    .zip(gamma)
+                    .all(|(o, g)| (0.0..=g * (1.0 + 1e-3)).contains(o))
+        }
+        (None, None) => true,
+        _ => false,
+    };
+    all(&[
+        (
+            bounded(&control.spectral_radius, control.spec.decay)
+                && bounded(
+                    &synthesis.observer.spectral_radius,
+                    synthesis.observer.spec.decay,
+                ),
+            "a reported spectral radius",
+        ),
+        (optimum, "the reported optimum of gamma"),
+    ])
+}

@@ -1,0 +1,254 @@
+//! Gains of a fixed linear loop: found in floating point, proved from enclosures.
+//!
+//! The proof of an l2 gain is the bounded-real lemma with a Lyapunov matrix `S`; that of the response
+//! to white noise the Lyapunov inequality. A stated level needs nothing else: the matrix that proves it
+//! comes from a Riccati or Lyapunov equation at that very level, and only its proof is trusted.
+
+use crate::certificate::{Coordinates, Enclosure, FactoredLyapunov};
+use crate::riccati;
+use crate::units::power_of_two;
+use nalgebra::{Complex, DMatrix};
+use std::f64::consts::PI;
+
+/// One channel of a loop: `x+ = a x + b w`, `z = c x + d w`.
+pub(crate) struct Channel<'a> {
+    pub a: &'a Enclosure,
+    pub b: &'a Enclosure,
+    pub c: &'a Enclosure,
+    pub d: &'a Enclosure,
+}
+
+/// Strictness of the matrix that is sought, relative to coordinates in which it is near one; the
+/// first that proves the level is taken.
+const STRICTNESS: [f64; 3] = [1e-3, 1e-4, 1e-5];
+
+/// By how much a level may lie above the norm, tried in turn.
+const ALLOWANCES: [f64; 11] = [2e-4, 1e-3, 2e-3, 5e-3, 0.01, 0.02, 0.05, 0.1, 0.3, 1.0, 3.0];
+
+/// A gain below this, in the units of the certificate, is not told from zero.
+const SMALLEST: f64 = 1e-9;
+
+impl Channel<'_> {
+    /// Whether the l2 gain is proved to be at most `level`.
+    pub fn proves(&self, level: f64) -> bool {
+        let storages = STRICTNESS
+            .iter()
+            .filter_map(|&eps| self.storage(level, eps));
+        storages.into_iter().any(|basis| {
+            let own = FactoredLyapunov::plain(DMatrix::identity(basis.nrows(), basis.nrows()));
+            self.proves_with(
+                level,
+                &FactoredLyapunov {
+                    basis,
+                    ..own.clone()
+                },
+                None,
+            )
+        })
+    }
+
+    /// The same with a given `S` of this mode, and that of the next where it is another one.
+    pub fn proves_with(
+        &self,
+        level: f64,
+        own: &FactoredLyapunov,
+        next: Option<&FactoredLyapunov>,
+    ) -> bool {
+        let (Some(own), next) = (Coordinates::new(own), next.map(Coordinates::new)) else {
+            return false;
+        };
+        let next = match &next {
+            Some(Some(next)) => next,
+            Some(None) => return false,
+            None => &own,
+        };
+        if level.is_nan() || level <= 0.0 {
+            return false;
+        }
+        self.block(level, &own, next).is_positive_definite()
+    }
+
+    /// `[S (A S)' (C S)'; . gamma^2 I B' D'; . . S_next; . . . I]` with the disturbance in units of
+    /// about `gamma`.
+    fn block(&self, level: f64, own: &Coordinates, next: &Coordinates) -> Enclosure {
+        let unit = power_of_two(level);
+        let (size, inputs) = self.b.shape();
+        let signals = self.c.shape().0;
+        let scaled = |matrix: &Enclosure| {
+            matrix.in_units(&vec![1.0; matrix.shape().0], &vec![1.0 / unit; inputs])
+        };
+        Enclosure::symmetric_blocks(&[
+            vec![own.whole().clone()],
+            vec![
+                Enclosure::zeros(inputs, size),
+                Enclosure::square_times_identity(level / unit, inputs),
+            ],
+            vec![
+                own.after(&next.seen(self.a)),
+                next.seen(&scaled(self.b)),
+                next.whole().clone(),
+            ],
+            vec![
+                own.after(self.c),
+                scaled(self.d),
+                Enclosure::zeros(signals, size),
+                Enclosure::exact(DMatrix::identity(signals, signals)),
+            ],
+        ])
+    }
+
+    /// `L` with `S = L L'`, the inverse of the storage function of the bounded-real lemma at `level`
+    /// for a performance signal enlarged by `eps`.
+    pub(super) fn storage(&self, level: f64, eps: f64) -> Option<DMatrix<f64>> {
+        let first = self.frame(level)?;
+        let inverse = first.clone().try_inverse()?;
+        let a = &inverse * self.a.midpoint() * &first;
+        let b = &inverse * self.b.midpoint() / level;
+        let c = self.c.midpoint() * &first;
+        let d = self.d.midpoint() / level;
+        let inputs = b.ncols();
+        let room = DMatrix::identity(inputs, inputs) - d.tr_mul(&d);
+        let room = room.cholesky()?.inverse();
+        let feedback = &room * d.tr_mul(&c);
+        let n = a.nrows();
+        let cost = c.tr_mul(&c) + c.tr_mul(&d) * &feedback;
+        let storage = riccati::solve(
+            &(&a + &b * feedback),
+            &(-(&b * &room * b.transpose())),
+            &(riccati::symmetric(cost) + DMatrix::identity(n, n) * (eps * eps)),
+        )?;
+        let root = storage.cholesky()?.unpack();
+        Some(first * root.transpose().try_inverse()?)
+    }
+
+    /// Coordinates in which the disturbance, in units of `level`, reaches every direction alike.
+    fn frame(&self, level: f64) -> Option<DMatrix<f64>> {
+        let (a, b) = (self.a.midpoint(), self.b.midpoint() / level);
+        let n = a.nrows();
+        let reach = &b * b.transpose();
+        let floor = 1e-6 * reach.amax().max(f64::MIN_POSITIVE.sqrt());
+        let gramian =
+            riccati::lyapunov(&a.transpose(), &(reach + DMatrix::identity(n, n) * floor))?;
+        Some(gramian.cholesky()?.unpack())
+    }
+
+    /// The largest singular value of the frequency response on a grid that holds every resonance: a
+    /// lower bound of the l2 gain.
+    pub fn norm(&self) -> f64 {
+        let angles = angles(self.a.midpoint());
+        angles.map(|angle| self.response(angle)).fold(0.0, f64::max)
+    }
+
+    fn response(&self, angle: f64) -> f64 {
+        let complex = |matrix: &DMatrix<f64>| matrix.map(Complex::from);
+        let n = self.a.shape().0;
+        let turn = DMatrix::from_diagonal_element(n, n, Complex::from_polar(1.0, angle));
+        let inner = (turn - complex(self.a.midpoint()))
+            .lu()
+            .solve(&complex(self.b.midpoint()));
+        let Some(inner) = inner else {
+            return f64::INFINITY;
+        };
+        let response = complex(self.c.midpoint()) * inner + complex(self.d.midpoint());
+        match response.is_empty() {
+            true => 0.0,
+            false => response.singular_values().max(),
+        }
+    }
+
+    /// The least of the tried levels that is proved; `None` where none is.
+    pub fn level(&self) -> Option<f64> {
+        let norm = self.norm().max(SMALLEST);
+        let mut levels = ALLOWANCES.iter().map(|allowance| norm * (1.0 + allowance));
+        levels.find(|&level| level.is_finite() && self.proves(level))
+    }
+
+    /// Root of the mean square of the signal under white noise of deviation one in every input:
+    /// floating point, no direct way.
+    pub fn noise(&self) -> Option<f64> {
+        let (a, b, c) = (self.a.midpoint(), self.b.midpoint(), self.c.midpoint());
+        let covariance = riccati::lyapunov(&a.transpose(), &(b * b.transpose()))?;
+        let direct = self.d.midpoint();
+        Some(((c * covariance * c.transpose()).trace() + direct.norm_squared()).sqrt())
+    }
+
+    /// Whether that root is proved to be at most `level`; only for a channel with no direct way.
+    pub fn proves_noise(&self, level: f64) -> bool {
+        let Some(lyapunov) = self.observability(level) else {
+            return false;
+        };
+        let Some(own) = Coordinates::new(&lyapunov) else {
+            return false;
+        };
+        let unit = power_of_two(level);
+        let (size, inputs) = self.b.shape();
+        let signals = self.c.shape().0;
+        let scale = vec![1.0 / unit; signals];
+        let decay = Enclosure::symmetric_blocks(&[
+            vec![own.whole().clone()],
+            vec![own.after(&own.seen(self.a)), own.whole().clone()],
+            vec![
+                own.after(&self.c.in_units(&scale, &vec![1.0; size])),
+                Enclosure::zeros(signals, size),
+                Enclosure::exact(DMatrix::identity(signals, signals)),
+            ],
+        ]);
+        let seen = own.seen(self.b);
+        let energy = seen.midpoint().tr_mul(seen.midpoint());
+        let floor = 1e-9 * energy.trace() / inputs as f64 + f64::MIN_POSITIVE.sqrt();
+        let energy =
+            riccati::symmetric(energy * (1.0 + 1e-9)) + DMatrix::identity(inputs, inputs) * floor;
+        let trace = energy.trace() * (1.0 + 1e-12);
+        let bound = Enclosure::symmetric_blocks(&[
+            vec![Enclosure::exact(energy)],
+            vec![seen, own.whole().clone()],
+        ]);
+        self.d.midpoint().amax() == 0.0
+            && self.d.radius().amax() == 0.0
+            && trace <= (level / unit) * (level / unit)
+            && decay.is_positive_definite()
+            && bound.is_positive_definite()
+    }
+
+    /// `S` whose inverse solves `P = A'P A + C'C` for a signal, in units of `level`, enlarged a little.
+    fn observability(&self, level: f64) -> Option<FactoredLyapunov> {
+        let first = self.frame(1.0)?;
+        let inverse = first.clone().try_inverse()?;
+        let a = &inverse * self.a.midpoint() * &first;
+        let c = self.c.midpoint() * &first / power_of_two(level);
+        let n = a.nrows();
+        let room = 1e-3 * c.norm_squared() / n as f64;
+        let cost = riccati::symmetric(c.tr_mul(&c)) + DMatrix::identity(n, n) * room;
+        let root = riccati::lyapunov(&a, &cost)?.cholesky()?.unpack();
+        Some(FactoredLyapunov {
+            basis: first * root.transpose().try_inverse()?,
+            core: DMatrix::identity(n, n),
+        })
+    }
+
+    /// The least of the tried levels of the response to white noise that is proved.
+    pub fn noise_level(&self) -> Option<f64> {
+        let norm = self.noise()?.max(SMALLEST);
+        let mut levels = ALLOWANCES.iter().map(|allowance| norm * (1.0 + allowance));
+        levels.find(|&level| level.is_finite() && self.proves_noise(level))
+    }
+}
+
+/// Angles per sample at which a response is looked at: a grid from slow to fast, and the angle of
+/// every eigenvalue and its neighbourhood.
+fn angles(a: &DMatrix<f64>) -> impl Iterator<Item = f64> {
+    let slow = (0..60).map(|k| PI * 10f64.powf(-6.0 + 0.1 * f64::from(k)));
+    let even = (0..=60).map(|k| PI * f64::from(k) / 60.0);
+    let poles = a.complex_eigenvalues();
+    let resonances: Vec<f64> = poles
+        .iter()
+        .filter(|pole| pole.norm() > 1e-3)
+        .flat_map(|pole| {
+            let width = (1.0 - pole.norm()).abs();
+            let angle = pole.arg().abs();
+            [-1.0, -0.5, -0.2, 0.0, 0.2, 0.5, 1.0]
+                .map(|share| (angle + share * width).clamp(0.0, PI))
+        })
+        .collect();
+    slow.chain(even).chain(resonances)
+}
