@@ -84,8 +84,9 @@ browser: build
 demo: build $(VENV)/ready
 	PYTHONPATH=tests/support $(IN_VENV)python tests/fmpy/demo.py examples/paper.toml out/demo
 
-bench: build
+bench: build $(VENV)/ready
 	cargo bench --workspace
+	PYTHONPATH=tests/support $(IN_VENV)python tests/cvxpy/design_time.py --write docs/performance.md
 
 # Fuzzing needs a C++ compiler; each of TARGETS runs for SECONDS, ABREAST of them side by side.
 SECONDS ?= 30

@@ -5,10 +5,11 @@
 #![allow(missing_docs)]
 
 use ftc_control::parameters::{Compensation, EstimatorMethod};
-use ftc_control::{Compensate, Controller, Sample};
+use ftc_control::{Compensate, Controller};
 use ftc_design::assembly::{DatabaseSource, EstimatorSpec, Request, Threshold, assemble};
 use ftc_design::{
-    ControlSpec, Design, Lyapunov, Objective, ObserverChoice, ObserverSpec, Signal, Signals,
+    ControlSpec, Design, HypothesesSpec, Lyapunov, Objective, ObserverChoice, ObserverSpec, Signal,
+    Signals,
 };
 use ftc_plant::scenario::{ModeInterval, Waveform};
 use ftc_plant::{Mode, OperatingPoint, Scenario, SwitchedPlant, TruePlant};
@@ -51,6 +52,7 @@ fn request(lyapunov: Lyapunov, bumpless: bool) -> Request {
             inputs: signals("u"),
             outputs: signals("y"),
             states: signals("x"),
+            disturbances: Vec::new(),
         },
         plant: plant(),
         true_plant: TruePlant::AsDesigned,
@@ -82,6 +84,7 @@ fn request(lyapunov: Lyapunov, bumpless: bool) -> Request {
             stuck_after: 0,
             adapt: false,
             disturbance: None,
+            hypotheses: HypothesesSpec::default(),
         },
         compensation: Compensation::None,
         scenario: Scenario {
@@ -108,17 +111,10 @@ fn run(design: &Design, period: usize) -> (f64, f64) {
     for k in 0..3000_usize {
         let mode = (k / period) % 2;
         let w = 0.01 * (0.314 * k as f64).sin();
-        controller.tick(
-            &mut state,
-            &Sample {
-                tick: k as u64,
-                mode,
-                measurement: &[x[0]],
-                reference: &[1.0],
-                thresholds: &[1.0],
-                compensate: Compensate::Nothing,
-            },
-        );
+        let y = [x[0]];
+        let sample = controller.sample(k as u64, mode, &y, &[1.0]).unwrap();
+        let sample = sample.compensating(Compensate::Nothing).unwrap();
+        controller.tick(&mut state, &sample);
         let u = state.command[0];
         if k > 0 && k % period == 0 {
             jump = jump.max((u - before).abs());

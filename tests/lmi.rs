@@ -133,3 +133,40 @@ fn solving_is_deterministic() {
     let bits = |values: Vec<f64>| values.into_iter().map(f64::to_bits).collect::<Vec<_>>();
     assert_eq!(bits(solve()), bits(solve()));
 }
+
+/// The interior-point method that uses the structure and the general solver find the same margin of an
+/// observer's inequalities, feasible or not.
+#[test]
+fn both_solvers_find_the_same_margin() {
+    let mut lottery = Lottery(17);
+    let mut infeasible = 0;
+    for case in 0..30 {
+        let (n, p) = (lottery.between(1, 5), lottery.between(1, 3));
+        let shape = lottery.matrix(n, n);
+        let a = &shape * (1.4 / ftc_plant::spectral_radius(&shape));
+        let c = match case % 3 {
+            0 => DMatrix::zeros(p, n),
+            _ => lottery.matrix(p, n),
+        };
+        let mut problem = Problem::new();
+        let (lyapunov, injection) = (problem.symmetric(n), problem.full(n, p));
+        let error = lyapunov.expression() * &a - injection.expression() * &c;
+        let own = 0.81 * lyapunov.expression();
+        let rows = vec![
+            vec![Some(own)],
+            vec![Some(error), Some(lyapunov.expression())],
+        ];
+        problem.require(Inequality::new(name(0), rows));
+        problem.require_trace(&[lyapunov.expression()], n as f64);
+        let (structured, general) = (
+            problem.margin().unwrap().margin,
+            problem.margin_by_general_solver().unwrap().margin,
+        );
+        assert!(
+            (structured - general).abs() < 1e-6 + 1e-3 * general.abs(),
+            "case {case}: {structured} {general}"
+        );
+        infeasible += usize::from(general < 1e-8);
+    }
+    assert!(infeasible >= 10, "{infeasible} infeasible cases");
+}

@@ -170,7 +170,8 @@ proptest! {
 #[test]
 fn wrong_sizes_are_refused_by_field() {
     use ftc_control::{ControllerError, ControllerParameters, Matrix, SampleError};
-    let damage: [(&str, fn(&mut ControllerParameters)); 9] = [
+    type Damage = fn(&mut ControllerParameters);
+    let damage: [(&str, Damage); 9] = [
         ("modes[1].b", |p| p.modes[1].b = Matrix::zeros(2, 1)),
         ("modes[0].x0", |p| p.modes[0].x0[0] = f64::NAN),
         ("feedback.tracked", |p| p.feedback.tracked = vec![0, 2]),

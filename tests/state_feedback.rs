@@ -5,14 +5,16 @@
 mod plants;
 
 use ftc_design::augmented::augment;
-use ftc_design::state_feedback::synthesise;
-use ftc_design::{ControlSpec, DesignError, Lyapunov, Objective, StateFeedback, Units};
+use ftc_design::state_feedback::{synthesise, synthesise_with};
+use ftc_design::{
+    ControlSpec, DesignError, Lyapunov, Objective, Run, Solver, StateFeedback, Units,
+};
 use ftc_plant::scaling::Scaling;
 use ftc_plant::{SwitchedPlant, spectral_radius};
 use nalgebra::{Complex, DMatrix};
 use plants::{
-    Channel, half_unstable, paper, paper_spec, random_plant, rectifier, sparsely_disturbed,
-    three_modes, two_channels,
+    Channel, half_unstable, in_units, paper, paper_spec, random_plant, rectifier,
+    sparsely_disturbed, spread_units, three_modes, two_channels, usual_spec,
 };
 
 /// Half a unit of the fourth decimal, to which the reference values are given, plus the hair that
@@ -470,4 +472,65 @@ fn more_tracked_outputs_than_inputs_are_refused_at_once() {
         error.to_string(),
         "2 tracked outputs need at least 2 inputs, but the plant has 1: track fewer outputs"
     );
+}
+
+/// Units spread over twelve decades change neither the verdict nor gamma: the whole is in the bench.
+///
+/// promise: any-units
+#[test]
+fn units_change_neither_verdict_nor_gamma() {
+    let mut designed = 0;
+    for seed in 0..12 {
+        let plant = random_plant(seed, 1.0);
+        let dims = plant.dimensions();
+        let spec = usual_spec(seed, dims);
+        let units = spread_units(seed, dims);
+        let (twin, twin_spec) = in_units(&plant, &spec, &units);
+        let own = synthesise(&plant, &spec, &Scaling::automatic(&plant));
+        let other = synthesise(&twin, &twin_spec, &Scaling::automatic(&twin));
+        match (own, other) {
+            (Ok(own), Ok(other)) => {
+                designed += 1;
+                let pairs = own.gamma.unwrap().into_iter().zip(other.gamma.unwrap());
+                for (own, other) in pairs {
+                    assert!(
+                        (own / other - 1.0).abs() < 1e-4,
+                        "seed {seed}: {own} {other}"
+                    );
+                }
+            }
+            (Err(DesignError::Infeasible(_)), Err(DesignError::Infeasible(_))) => {}
+            (own, other) => panic!("seed {seed}: {:?} {:?}", own.err(), other.err()),
+        }
+    }
+    assert!(designed >= 6, "{designed} designs");
+}
+
+/// Both solvers come to the same gamma.
+#[test]
+fn both_solvers_agree() {
+    let general = Run {
+        solver: Solver::General,
+        ..Run::default()
+    };
+    let mut compared = 0;
+    for seed in 0..9 {
+        let plant = random_plant(seed, 1.0);
+        let spec = usual_spec(seed, plant.dimensions());
+        let scaling = Scaling::automatic(&plant);
+        let (Ok(own), Ok(other)) = (
+            synthesise(&plant, &spec, &scaling),
+            synthesise_with(&plant, &spec, &scaling, &general),
+        ) else {
+            continue;
+        };
+        compared += 1;
+        for (own, other) in own.gamma.unwrap().into_iter().zip(other.gamma.unwrap()) {
+            assert!(
+                (own / other - 1.0).abs() < 1e-4,
+                "seed {seed}: {own} {other}"
+            );
+        }
+    }
+    assert!(compared >= 5, "{compared} plants compared");
 }

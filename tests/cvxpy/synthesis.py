@@ -99,20 +99,25 @@ class NoSolverConverged(RuntimeError):
     """Every solver gave up on the problem, which is then most likely infeasible."""
 
 
-def _solve(models: list[Augmented], decay: float, solvers: tuple[str, ...]) -> tuple[float, np.ndarray]:
-    """Returns the least g = gamma^2 with its Q, from the first solver that converges."""
+def problem(models: list[Augmented], decay: float) -> tuple[cp.Problem, cp.Variable]:
+    """Returns (T2) with one Lyapunov matrix Q for these modes, and Q."""
     N, m = models[0].B.shape
     Q = cp.Variable((N, N), symmetric=True)
     g = cp.Variable()
     constraints = [block >> 0 for model in models for block in _blocks(model, decay, Q, cp.Variable((m, N)), g)]
-    problem = cp.Problem(cp.Minimize(g), constraints)
+    return cp.Problem(cp.Minimize(g), constraints), Q
+
+
+def _solve(models: list[Augmented], decay: float, solvers: tuple[str, ...]) -> tuple[float, np.ndarray]:
+    """Returns the least g = gamma^2 with its Q, from the first solver that converges."""
+    task, Q = problem(models, decay)
     for solver in solvers:
         with warnings.catch_warnings(), contextlib.suppress(cp.SolverError):
             warnings.simplefilter("ignore")  # cvxpy warns of inaccuracy, which the status tells as well
-            problem.solve(solver=solver, **OPTIONS[solver])
-            if problem.status in ACCEPTED[solver]:
-                return float(problem.value), Q.value
-    raise NoSolverConverged(problem.status)
+            task.solve(solver=solver, **OPTIONS[solver])
+            if task.status in ACCEPTED[solver]:
+                return float(task.value), Q.value
+    raise NoSolverConverged(task.status)
 
 
 def _in_coordinates(model: Augmented, T: np.ndarray) -> Augmented:

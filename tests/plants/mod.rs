@@ -2,7 +2,8 @@
 #![allow(dead_code)] // each test file uses its own part
 
 use ftc_design::{ControlSpec, Lyapunov};
-use ftc_plant::{Mode, OperatingPoint, SwitchedPlant};
+use ftc_plant::scaling::Scaling;
+use ftc_plant::{Dimensions, Mode, OperatingPoint, SwitchedPlant};
 use nalgebra::DMatrix;
 
 /// Where the paper's disturbance enters.
@@ -374,4 +375,52 @@ pub fn rectifier() -> SwitchedPlant {
         })
         .collect();
     SwitchedPlant { sample_time, modes }
+}
+
+/// A plant and a request in other units of states, inputs and outputs.
+pub fn in_units(
+    plant: &SwitchedPlant,
+    spec: &ControlSpec,
+    units: &Scaling,
+) -> (SwitchedPlant, ControlSpec) {
+    let over = |weights: &[f64], units: &mut dyn Iterator<Item = f64>| {
+        weights.iter().zip(units).map(|(w, u)| w * u).collect()
+    };
+    let tracked = || spec.tracked.iter().map(|&output| units.outputs[output]);
+    let changed = ControlSpec {
+        output_weight: over(&spec.output_weight, &mut tracked()),
+        integral_weight: over(&spec.integral_weight, &mut tracked()),
+        input_weight: over(&spec.input_weight, &mut units.inputs.iter().copied()),
+        ..spec.clone()
+    };
+    (units.apply(plant), changed)
+}
+
+/// Each guarantee in turn, with the usual weights.
+pub fn usual_spec(seed: u64, dims: Dimensions) -> ControlSpec {
+    let r = dims.outputs.min(dims.inputs);
+    ControlSpec {
+        decay: 0.95,
+        lyapunov: [Lyapunov::Common, Lyapunov::Switched, Lyapunov::Dwell][seed as usize % 3],
+        integral_weight: vec![0.3; r],
+        input_weight: vec![0.1; dims.inputs],
+        ..ControlSpec::new(dims)
+    }
+}
+
+/// Units of all signals, evenly spread on the logarithmic scale from 1e-6 to 1e6.
+pub fn spread_units(seed: u64, dims: Dimensions) -> Scaling {
+    let mut state = seed.wrapping_mul(0x9E37_79B9_7F4A_7C15) | 1;
+    let mut unit = || {
+        state = state
+            .wrapping_mul(6364136223846793005)
+            .wrapping_add(1442695040888963407);
+        10f64.powf(12.0 * ((state >> 11) as f64 / (1u64 << 53) as f64) - 6.0)
+    };
+    let mut units = |count: usize| (0..count).map(|_| unit()).collect();
+    Scaling {
+        states: units(dims.states),
+        inputs: units(dims.inputs),
+        outputs: units(dims.outputs),
+    }
 }

@@ -116,15 +116,15 @@ impl PlantFmu {
         for span in self.spans.injected {
             require_finite(&self.table, values, span)?;
         }
-        let kinds = values.get(self.spans.injected[0]).iter().enumerate();
+        let mut kinds = values.get(self.spans.injected[0]).iter().enumerate();
         let last = f64::from(LAST_INJECTED_KIND);
-        for (at, kind) in kinds.filter(|(_, kind)| !(0.0..=last).contains(*kind)) {
-            return Err(Refusal::from(format!(
+        match kinds.find(|(_, kind)| !(0.0..=last).contains(*kind)) {
+            Some((at, kind)) => Err(Refusal::from(format!(
                 "inject_kind[{}] is {kind}: give a kind from 0 to {last}",
                 at + 1
-            )));
+            ))),
+            None => Ok(()),
         }
-        Ok(())
     }
 
     /// Observes the present tick and publishes every output.

@@ -89,7 +89,7 @@ pub fn theorem_1(plant: &SwitchedPlant) -> Result<PrintedVerdict, DesignError> {
         "(10)",
         "block rows 2 and 4 hold [Q Q; Q Q], which is singular for every Q, so the matrix cannot be positive \
          definite; semidefinite it forces H_i B_i' = 0, that is, no integral action",
-        problem.margin()?,
+        problem.margin_by_general_solver()?,
     ))
 }
 
@@ -158,6 +158,6 @@ pub fn theorem_2(plant: &SwitchedPlant, spec: &ControlSpec) -> Result<PrintedVer
         "(36)",
         "eta >= -Q^-1 for every X, so the Schur complement of blocks 2 and 6 is at least H'H and cannot be \
          negative: the printed model (24) leaves the integrator's eigenvalue at 1",
-        problem.margin()?,
+        problem.margin_by_general_solver()?,
     ))
 }

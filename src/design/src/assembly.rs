@@ -5,8 +5,8 @@ use super::harmonics;
 use super::hypotheses::HypothesesSpec;
 use super::matrices::{dense, plain};
 use super::{
-    ControlSpec, ControllerDesign, Design, DesignError, FORMAT, ObserverSpec, Signal, Signals,
-    check_controllable, synthesise,
+    ControlSpec, ControllerDesign, Design, DesignError, FORMAT, ObserverSpec, Run, Signal, Signals,
+    check_controllable, synthesise_with,
 };
 use crate::running_loop::{TRANSFER_DECAY, TransferCertificate};
 use ftc_control::parameters::{
@@ -148,6 +148,14 @@ const MOST_COEFFICIENTS: usize = 2000;
 /// # Errors
 /// [`DesignError::Request`] where the request is ill-formed, else what the synthesis says.
 pub fn assemble(request: Request) -> Result<Design, DesignError> {
+    assemble_with(request, &Run::default())
+}
+
+/// [`assemble`] with a chosen solver and someone who watches.
+///
+/// # Errors
+/// As [`assemble`].
+pub fn assemble_with(request: Request, run: &Run) -> Result<Design, DesignError> {
     let dims = Dimensions::check(&request.plant).map_err(DesignError::Request)?;
     let asked = request.control.check(dims);
     asked.map_err(DesignError::Request)?;
@@ -158,7 +166,8 @@ pub fn assemble(request: Request) -> Result<Design, DesignError> {
         noise: observer_noise(&request),
         ..request.observer.clone()
     };
-    let mut synthesis = synthesise(&request.plant, &request.control, &observer, &scaling)?;
+    let mut synthesis =
+        synthesise_with(&request.plant, &request.control, &observer, &scaling, run)?;
     if request.bumpless
         && request.plant.modes.len() > 1
         && !synthesis.certify_transfer(&request.plant)

@@ -1,6 +1,7 @@
 //! Whether the inputs reach what they are asked to govern, before any inequality is solved.
 
 use super::augmented::{AugmentedMode, augment};
+use super::units::other_scaling;
 use super::{ControlSpec, Units};
 use ftc_plant::SwitchedPlant;
 use ftc_plant::scaling::Scaling;
@@ -12,9 +13,21 @@ const RANK_TOLERANCE: f64 = 1e-11;
 /// Checks by the Popov-Belevitch-Hautus test that every eigenvalue of every mode, the integrators'
 /// and the resonators' included, that decays more slowly than asked can be moved by the inputs.
 ///
+/// A verdict that something is uncontrollable is given only after another scaling has confirmed it.
+///
 /// # Errors
 /// One sentence that names the mode and the eigenvalue.
 pub fn check_controllable(
+    plant: &SwitchedPlant,
+    spec: &ControlSpec,
+    scaling: &Scaling,
+) -> Result<(), String> {
+    let first = check_scaled(plant, spec, scaling);
+    first.or_else(|what| check_scaled(plant, spec, &other_scaling(plant, scaling)).or(Err(what)))
+}
+
+/// The check in one scaling.
+fn check_scaled(
     plant: &SwitchedPlant,
     spec: &ControlSpec,
     scaling: &Scaling,

@@ -42,6 +42,8 @@ pub mod harmonics;
 #[cfg(feature = "solver")]
 mod hypotheses;
 #[cfg(feature = "solver")]
+mod interior_point;
+#[cfg(feature = "solver")]
 pub mod lmi;
 mod lyapunov;
 mod matrices;
@@ -49,6 +51,8 @@ pub mod observer;
 mod record;
 pub(crate) mod riccati;
 pub mod running_loop;
+#[cfg(feature = "solver")]
+mod solver;
 mod spec;
 pub mod state_feedback;
 mod units;
@@ -71,12 +75,14 @@ pub use matrices::{dense, mode_models, plain};
 pub use observer::{LostCertificate, ObserverCertificate, ObserverDesign};
 pub use record::{ControllerDesign, Design, FORMAT, Signal, Signals};
 pub use running_loop::{LostSensors, RunningLoop, SwitchingGain};
+#[cfg(feature = "solver")]
+pub use solver::{Run, Solver, Step};
 pub use spec::{ControlSpec, Objective, ObserverChoice, ObserverSpec};
 pub use state_feedback::{ModeGains, StateFeedback};
 pub use units::Units;
 pub use verdict::{
-    Advice, BlockKind, BlockName, ConflictingBlock, DesignError, Infeasibility, SolverFailure,
-    Uncertified,
+    Advice, BlockKind, BlockName, ConflictingBlock, DesignError, Infeasibility, Partial,
+    SolverFailure, Uncertified,
 };
 
 /// A certified state feedback and a certified observer for one plant.
@@ -122,13 +128,42 @@ pub fn synthesise(
     observer: &ObserverSpec,
     scaling: &Scaling,
 ) -> Result<Synthesis, DesignError> {
-    let state_feedback = state_feedback::synthesise(plant, control, scaling)?;
-    let (observer, running_loop) = running_loop::choose(plant, &state_feedback, observer, scaling)?;
-    Ok(Synthesis {
-        state_feedback,
-        observer,
-        running_loop,
-    })
+    synthesise_with(plant, control, observer, scaling, &Run::default())
+}
+
+/// [`synthesise`] with a chosen solver and someone who watches. That there is no observer is said only
+/// after another scaling has confirmed it.
+///
+/// # Errors
+/// As [`synthesise`]; [`DesignError::Partial`] where one of the two was found.
+#[cfg(feature = "solver")]
+pub fn synthesise_with(
+    plant: &SwitchedPlant,
+    control: &ControlSpec,
+    observer: &ObserverSpec,
+    scaling: &Scaling,
+    run: &Run,
+) -> Result<Synthesis, DesignError> {
+    let state_feedback = match state_feedback::synthesise_with(plant, control, scaling, run) {
+        Ok(found) => found,
+        Err(error @ DesignError::Request(_)) => return Err(error),
+        Err(error) => {
+            let observer = observer::synthesise(plant, observer, scaling);
+            return Err(error.with_parts(None, observer.ok()));
+        }
+    };
+    let choose =
+        |scaling: &Scaling| running_loop::choose(plant, &state_feedback, observer, scaling);
+    let chosen = choose(scaling);
+    match chosen.or_else(|error| choose(&units::other_scaling(plant, scaling)).or(Err(error))) {
+        Ok((observer, running_loop)) => Ok(Synthesis {
+            state_feedback,
+            observer,
+            running_loop,
+        }),
+        Err(error @ DesignError::Request(_)) => Err(error),
+        Err(error) => Err(error.with_parts(Some(state_feedback), None)),
+    }
 }
 
 /// The Moore-Penrose inverse; singular values below `tolerance` times the largest count as zero.

@@ -5,14 +5,20 @@
 #[cfg(feature = "solver")]
 mod advice;
 #[cfg(feature = "solver")]
+mod direct;
+#[cfg(feature = "solver")]
 mod frame;
+#[cfg(feature = "solver")]
+mod riccati;
+#[cfg(feature = "solver")]
+mod structured;
 #[cfg(feature = "solver")]
 mod synthesis;
 #[cfg(feature = "solver")]
 mod theorem;
 
 #[cfg(feature = "solver")]
-pub use synthesis::synthesise;
+pub use synthesis::{synthesise, synthesise_with};
 
 use super::certificate::{self, CertificateError, ControlCertificate};
 use super::matrices::plain;

@@ -87,6 +87,23 @@ impl Units {
     }
 }
 
+/// Another scaling of the same plant, in which a verdict is confirmed: the balanced one, or none at all
+/// where the balanced one is what was used.
+pub(crate) fn other_scaling(plant: &SwitchedPlant, used: &Scaling) -> Scaling {
+    let balanced = Scaling::automatic(plant);
+    let pairs = [
+        (&used.states, &balanced.states),
+        (&used.inputs, &balanced.inputs),
+        (&used.outputs, &balanced.outputs),
+    ];
+    let mut values = pairs.iter().flat_map(|(a, b)| a.iter().zip(b.iter()));
+    if values.all(|(a, b)| (0.5..=2.0).contains(&(a / b))) {
+        let dims = plant.dimensions();
+        return Scaling::unit(dims.states, dims.inputs, dims.outputs);
+    }
+    balanced
+}
+
 /// Whether a number can be a unit: a power of two, far from where scaling by it could overflow, or
 /// underflow and hide a number.
 pub(crate) fn is_unit(unit: f64) -> bool {

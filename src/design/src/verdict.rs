@@ -96,6 +96,10 @@ pub enum Advice {
     LyapunovAndDecay(super::Lyapunov, f64),
     /// Track fewer outputs (indices from 0).
     Tracked(Vec<usize>),
+    /// Ask for a slower decay of the observer's error.
+    ObserverDecay(f64),
+    /// Ask for another kind of guarantee of the observer.
+    ObserverLyapunov(super::Lyapunov),
     /// Keep only so many of the internal model's harmonics.
     Harmonics(usize),
 }
@@ -123,6 +127,8 @@ impl Advice {
                 changed.tracked.clone_from(outputs);
             }
             Self::Harmonics(count) => changed.resonators.truncate(*count),
+            // These change the observer's request.
+            Self::ObserverDecay(_) | Self::ObserverLyapunov(_) => {}
         }
         changed
     }
@@ -135,27 +141,40 @@ impl Advice {
 impl fmt::Display for Advice {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
-            Self::Decay(decay) => write!(f, "a slower decay is feasible: decay = {decay}"),
-            Self::Lyapunov(kind) => {
-                write!(f, "another guarantee is feasible: lyapunov = \"{kind}\"")
+            Self::Decay(decay) => {
+                write!(f, "a slower decay is feasible: controller.decay = {decay}")
             }
+            Self::Lyapunov(kind) => {
+                write!(
+                    f,
+                    "another guarantee is feasible: controller.lyapunov = \"{kind}\""
+                )
+            }
+            Self::ObserverDecay(decay) => write!(
+                f,
+                "a slower decay of the observer is feasible: observer.decay = {decay}"
+            ),
+            Self::ObserverLyapunov(kind) => write!(
+                f,
+                "another guarantee is feasible for the observer: controller.lyapunov = \"{kind}\""
+            ),
             Self::LyapunovAndDecay(kind, decay) => write!(
                 f,
-                "another guarantee with a slower decay is feasible: lyapunov = \"{kind}\", decay = {decay}"
+                "another guarantee with a slower decay is feasible: controller.lyapunov = \"{kind}\", controller.decay = {decay}"
             ),
             Self::Harmonics(0) => write!(
                 f,
-                "integral action alone is feasible: internal_model = false"
+                "integral action alone is feasible: controller.internal_model = false"
             ),
             Self::Harmonics(count) => write!(
                 f,
-                "an internal model of fewer harmonics is feasible: harmonics = {count}"
+                "an internal model of fewer harmonics is feasible: disturbance.harmonics = {count}"
             ),
             Self::Tracked(outputs) => {
                 let numbers: Vec<String> = outputs.iter().map(|o| (o + 1).to_string()).collect();
                 write!(
                     f,
-                    "tracking fewer outputs is feasible: tracked = [{}]",
+                    "tracking fewer outputs is feasible: controller.tracked = [{}]",
                     numbers.join(", ")
                 )
             }
@@ -241,6 +260,20 @@ pub enum DesignError {
     /// The gains were found, but their certificate does not check.
     #[error("{0}")]
     Uncertified(Uncertified),
+    /// One part of the design failed, another was found.
+    #[error("{}", .0.error)]
+    Partial(Box<Partial>),
+}
+
+/// What was found of a design that failed.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Partial {
+    /// Why there is no design.
+    pub error: DesignError,
+    /// The certified state feedback, if that was found.
+    pub state_feedback: Option<super::StateFeedback>,
+    /// The certified observer, if that was found.
+    pub observer: Option<super::ObserverDesign>,
 }
 
 /// A certificate that does not check, and what would help.
@@ -282,8 +315,25 @@ impl DesignError {
         match self {
             Self::Infeasible(infeasibility) => Some(&mut infeasibility.advice),
             Self::Uncertified(uncertified) => Some(&mut uncertified.advice),
+            Self::Partial(partial) => partial.error.advice_mut(),
             Self::Request(_) | Self::Solver(_) => None,
         }
+    }
+
+    /// The same with the parts that were found.
+    pub(crate) fn with_parts(
+        self,
+        state_feedback: Option<super::StateFeedback>,
+        observer: Option<super::ObserverDesign>,
+    ) -> Self {
+        if state_feedback.is_none() && observer.is_none() {
+            return self;
+        }
+        Self::Partial(Box::new(Partial {
+            error: self,
+            state_feedback,
+            observer,
+        }))
     }
 }
 

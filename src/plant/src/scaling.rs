@@ -14,6 +14,29 @@ pub struct Scaling {
     pub outputs: Vec<f64>,
 }
 
+/// Magnitudes that are known of some signals; lists may be shorter than there are signals.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Known {
+    /// States (n).
+    pub states: Vec<Option<f64>>,
+    /// Inputs (m).
+    pub inputs: Vec<Option<f64>>,
+    /// Outputs (p).
+    pub outputs: Vec<Option<f64>>,
+}
+
+impl Known {
+    /// Logarithms of states, inputs and outputs.
+    fn logarithms(&self, n: usize, m: usize, p: usize) -> Vec<Option<f64>> {
+        let parts = [(&self.states, n), (&self.inputs, m), (&self.outputs, p)];
+        let part = |(values, size): (&Vec<Option<f64>>, usize)| {
+            let value = move |k: usize| values.get(k).copied().flatten().map(f64::ln);
+            (0..size).map(value).collect::<Vec<_>>()
+        };
+        parts.into_iter().flat_map(part).collect()
+    }
+}
+
 impl Scaling {
     /// No scaling at all.
     pub fn unit(states: usize, inputs: usize, outputs: usize) -> Self {
@@ -28,6 +51,12 @@ impl Scaling {
     /// non-zero entries of `A` (off the diagonal), `B`, `C`, `E` and `F` nearest to zero in the
     /// least-squares sense, the disturbances' own magnitudes being free.
     pub fn automatic(plant: &SwitchedPlant) -> Self {
+        Self::completed(plant, &Known::default())
+    }
+
+    /// [`Scaling::automatic`] about the magnitudes that are known, which stay as they are. Where none is
+    /// known of any signal, the outputs' are near one.
+    pub fn completed(plant: &SwitchedPlant, known: &Known) -> Self {
         let dims = plant.dimensions();
         let (n, m, p) = (dims.states, dims.inputs, dims.outputs);
         let [state, input, output, disturbance] = [0, n, n + m, n + m + p];
@@ -51,7 +80,13 @@ impl Scaling {
             }
         }
         let unknowns = disturbance + dims.disturbances;
-        let logarithms = balance(&entries, unknowns);
+        let given = known.logarithms(dims.states, dims.inputs, dims.outputs);
+        let mut logarithms = balance(&entries, &given, unknowns);
+        if given.iter().all(Option::is_none) {
+            // All signals may be scaled alike.
+            let shift = logarithms.rows(output, p).mean();
+            logarithms.add_scalar_mut(-shift);
+        }
         let magnitudes = |first: usize, count: usize| -> Vec<f64> {
             logarithms
                 .rows(first, count)
@@ -59,10 +94,18 @@ impl Scaling {
                 .map(|l| l.exp())
                 .collect()
         };
+        let filled = |known: &[Option<f64>], found: Vec<f64>| {
+            let known = known.iter().copied().chain(core::iter::repeat(None));
+            found
+                .into_iter()
+                .zip(known)
+                .map(|(found, known)| known.unwrap_or(found))
+                .collect()
+        };
         Self {
-            states: magnitudes(state, n),
-            inputs: magnitudes(input, m),
-            outputs: magnitudes(output, p),
+            states: filled(&known.states, magnitudes(state, n)),
+            inputs: filled(&known.inputs, magnitudes(input, m)),
+            outputs: filled(&known.outputs, magnitudes(output, p)),
         }
     }
 
@@ -95,8 +138,15 @@ impl Scaling {
     }
 }
 
-/// The shortest vector `l` that minimises the sum of `(value - l[row] + l[column])^2`.
-fn balance(entries: &[(usize, usize, f64)], unknowns: usize) -> DVector<f64> {
+/// The shortest vector `l` that minimises the sum of `(value - l[row] + l[column])^2`, held near the
+/// values that are given.
+fn balance(
+    entries: &[(usize, usize, f64)],
+    given: &[Option<f64>],
+    unknowns: usize,
+) -> DVector<f64> {
+    /// How much more a given value weighs than an entry.
+    const HOLD: f64 = 1e4;
     let mut normal = DMatrix::<f64>::zeros(unknowns, unknowns);
     let mut right = DVector::<f64>::zeros(unknowns);
     for &(row, column, value) in entries {
@@ -107,7 +157,14 @@ fn balance(entries: &[(usize, usize, f64)], unknowns: usize) -> DVector<f64> {
         right[row] += value;
         right[column] -= value;
     }
-    // The normal matrix is a graph's Laplacian: its eigenvalues are zero or not small.
+    for (index, value) in given.iter().enumerate() {
+        if let Some(value) = value {
+            normal[(index, index)] += HOLD;
+            right[index] += HOLD * value;
+        }
+    }
+    // The normal matrix is a graph's Laplacian, held at the given values: its eigenvalues are zero or
+    // not small.
     let eigen = normal.symmetric_eigen();
     let threshold = 1e-10 * unknowns as f64;
     let coordinates = eigen.eigenvectors.tr_mul(&right);

@@ -78,7 +78,10 @@ fn a_run_is_never_counted_twice() {
     let holes = merge([part(6..8), part(0..3)]).unwrap();
     assert_eq!(holes.done, [[0, 3], [6, 8]]);
     assert_eq!(holes.missing(0..10), [3..6, 8..10]);
-    assert_eq!(holes.missing(2..7), [3..6]);
+    assert_eq!(
+        holes.missing(2..7),
+        std::iter::once(3..6).collect::<Vec<_>>()
+    );
     assert_eq!(holes.missing(0..2), []);
     assert_eq!(merge([holes, part(3..6)]).unwrap().done, [[0, 8]]);
 }

@@ -16,12 +16,14 @@ mod campaigns;
 mod failure;
 mod identification;
 mod progress;
+mod solved;
 
 use clap::{Parser, Subcommand, ValueEnum};
 use design_file::Loaded;
 use failure::Failure;
-use ftc_design::Design;
+use ftc_design::assembly::Request;
 use ftc_design::warnings::LoggedMovement;
+use ftc_design::{Design, DesignError, Run, Solver, Step};
 use package::output::Staging;
 use progress::Progress;
 use report::{summary, warnings};
@@ -43,6 +45,9 @@ struct Arguments {
     /// Print nothing but errors.
     #[arg(long, global = true)]
     quiet: bool,
+    /// Which solver finds the gains; what it finds is certified either way.
+    #[arg(long, global = true, value_enum, default_value_t = SolverChoice::Structured)]
+    solver: SolverChoice,
 }
 
 const EXIT_CODES: &str = "\
@@ -71,6 +76,9 @@ enum Command {
         /// their best margins, and why they have no strictly feasible point.
         #[arg(long)]
         as_printed: bool,
+        /// Also keep the solved design in a file, for export and simulate with --solved.
+        #[arg(long, value_name = "FILE", conflicts_with = "as_printed")]
+        save: Option<PathBuf>,
     },
     /// Prove again, from the numbers in an FMU alone, what it promises. Nothing is solved.
     ///
@@ -98,6 +106,10 @@ enum Command {
         /// Directory to write to; made if it does not exist.
         #[arg(long, value_name = "DIR")]
         out: PathBuf,
+        /// Take the design that ftc-fmu design --save has solved, if it is that of this design file,
+        /// and prove it again instead of solving it again.
+        #[arg(long, value_name = "FILE")]
+        solved: Option<PathBuf>,
         /// Also write NAME.ssp: both FMUs and their connections in one file (SSP 1.0).
         #[arg(long)]
         ssp: bool,
@@ -114,6 +126,10 @@ enum Command {
         /// Directory to write to; made if it does not exist.
         #[arg(long, value_name = "DIR")]
         out: PathBuf,
+        /// Take the design that ftc-fmu design --save has solved, if it is that of this design file,
+        /// and prove it again instead of solving it again.
+        #[arg(long, value_name = "FILE")]
+        solved: Option<PathBuf>,
         /// Run two more: the paper's additive fault-tolerant control with gains that only decay
         /// (additive) and model predictive control without fault estimation (mpc); and give the
         /// error of a response as late as the plant needs and no later (deadbeat_bound).
@@ -148,6 +164,24 @@ enum Command {
         #[arg(long, value_name = "DIR")]
         out: PathBuf,
     },
+}
+
+/// Which solver finds the gains.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+enum SolverChoice {
+    /// The interior-point method that uses the structure of the inequalities.
+    Structured,
+    /// Clarabel alone: slower, for comparison.
+    Clarabel,
+}
+
+impl From<SolverChoice> for Solver {
+    fn from(choice: SolverChoice) -> Self {
+        match choice {
+            SolverChoice::Structured => Self::Structured,
+            SolverChoice::Clarabel => Self::General,
+        }
+    }
 }
 
 /// Exit code: done.
@@ -195,43 +229,60 @@ pub fn main(arguments: Vec<OsString>, binaries: Option<PathBuf>) -> u8 {
 /// Runs the command and returns what to print.
 fn run(arguments: &Arguments, binaries: Option<PathBuf>) -> Result<String, Failure> {
     let progress = Progress::new(arguments.quiet);
+    let asked = |solved, save| How {
+        solver: arguments.solver.into(),
+        solved,
+        save,
+    };
     match &arguments.command {
         Command::Design {
             design,
             json,
             as_printed: true,
+            ..
         } => {
             let request = read(design, &progress)?.request;
             progress.tell("looking for a margin");
             as_printed::report(design, request, *json)
         }
-        Command::Design { design, json, .. } => match (solve(design, &progress), json) {
+        Command::Design {
+            design, json, save, ..
+        } => match (
+            solve(design, &asked(None, save.as_deref()), &progress),
+            json,
+        ) {
             (Ok(made), false) => Ok(summary::text(&made.design, &made.warnings)),
             (Ok(made), true) => Ok(summary::json(&made.design, &made.warnings)),
             (Err(failure), false) => Err(failure),
             (Err(failure), true) => Err(failure.explained_in_json()),
         },
         Command::Verify { fmu, json } => verify(fmu, *json),
-        Command::Export { design, out, ssp } => {
+        Command::Export {
+            design,
+            out,
+            ssp,
+            solved,
+        } => {
             check_output(out)?;
-            let made = solve(design, &progress)?;
+            let made = solve(design, &asked(solved.as_deref(), None), &progress)?;
             export(&made, out, *ssp, binaries)
         }
         Command::Simulate {
             design,
             out,
             baselines,
+            solved,
         } => {
             check_output(out)?;
-            let made = solve(design, &progress)?;
+            let made = solve(design, &asked(solved.as_deref(), None), &progress)?;
             progress.tell("simulating");
             simulate(made, out, *baselines)
         }
-        Command::Campaign(asked) => {
-            asked.check()?;
-            let made = solve(asked.design(), &progress)?;
+        Command::Campaign(campaign) => {
+            campaign.check()?;
+            let made = solve(campaign.design(), &asked(None, None), &progress)?;
             drop(progress);
-            campaigns::run(made, asked, arguments.quiet)
+            campaigns::run(made, campaign, arguments.quiet)
         }
         Command::Identify(asked) => {
             let (folder, name) = asked.target();
@@ -372,8 +423,17 @@ struct Made {
     warnings: Vec<String>,
 }
 
-/// Reads a design file and makes the design.
-fn solve(path: &Path, progress: &Progress) -> Result<Made, Failure> {
+/// How a design comes about.
+struct How<'a> {
+    solver: Solver,
+    /// A file that holds it already.
+    solved: Option<&'a Path>,
+    /// Where to keep it.
+    save: Option<&'a Path>,
+}
+
+/// Reads a design file and makes the design, or takes it from where it was kept.
+fn solve(path: &Path, how: &How, progress: &Progress) -> Result<Made, Failure> {
     let Loaded {
         file,
         request,
@@ -382,14 +442,44 @@ fn solve(path: &Path, progress: &Progress) -> Result<Made, Failure> {
     } = read(path, progress)?;
     let asked = request.control.clone();
     let logged = LoggedMovement::of(&request.estimator.database);
-    progress.tell("solving for gains and certifying them");
-    let design = ftc_design::assembly::assemble(request).map_err(|error| {
-        eprint!("{}", warnings::text(&notes));
-        Failure::new(path, asked, error)
-    })?;
+    let key = solved::key(&request, how.solver);
+    let design = match how.solved {
+        Some(file) => {
+            progress.tell("proving again what was solved");
+            solved::load(file, &key)?
+        }
+        None => {
+            let made = synthesised(request, how.solver, progress);
+            made.map_err(|error| {
+                eprint!("{}", warnings::text(&notes));
+                Failure::new(path, asked, error)
+            })?
+        }
+    };
+    if let Some(file) = how.save {
+        solved::save(file, key, &design)?;
+    }
     let mut warnings = notes;
     warnings.extend(warnings::of_design(&file, logged.as_ref(), &design));
     Ok(Made { design, warnings })
+}
+
+/// Solves for a design and says how far it has come.
+fn synthesised(
+    request: Request,
+    solver: Solver,
+    progress: &Progress,
+) -> Result<Design, DesignError> {
+    progress.tell("solving for gains and certifying them");
+    let watch = |step: Step| match step {
+        Step::Iteration { number, usual, .. } => progress.iterate(step, number, usual),
+        Step::GeneralSolver => progress.tell(step.to_string()),
+    };
+    let run = Run {
+        solver,
+        watch: &watch,
+    };
+    ftc_design::assembly::assemble_with(request, &run)
 }
 
 /// Prints to standard output; a reader that has gone away is no error of ours.

@@ -27,7 +27,7 @@ noise = 0.001
 "#;
 
 fn run(design: &str, arguments: &[&str]) -> (i32, String, String) {
-    let bench = Bench::new(design.to_string());
+    let bench = Bench::new(design);
     let run = bench.run(arguments);
     (run.code(), run.stdout(), run.stderr())
 }
@@ -118,7 +118,7 @@ noise = 0.001
 /// `y(k) = C x(k) + D u(k-1)`, seen in the trajectories, and the fault-tolerant loop settles.
 #[test]
 fn a_direct_feedthrough_is_served_with_latency() {
-    let bench = Bench::new(FEEDTHROUGH.to_string());
+    let bench = Bench::new(FEEDTHROUGH);
     let run = bench.run(&["simulate", FILE, "--out", "out"]);
     assert_eq!(run.code(), 0, "{}", run.stderr());
     let mut reader = csv::Reader::from_path(bench.path("out/trajectories.csv")).unwrap();

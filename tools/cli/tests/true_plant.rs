@@ -161,7 +161,7 @@ fn a_wrong_true_plant_is_refused_by_key() {
 #[test]
 fn simulate_tries_other_plants() {
     let cases = |design: &str| {
-        let bench = Bench::new(design.to_string());
+        let bench = Bench::new(design);
         let run = bench.run(&["simulate", FILE, "--out", "out"]);
         assert_eq!(run.code(), 0, "{}", run.stderr());
         let json = fs::read(bench.path("out/robustness.json")).unwrap();

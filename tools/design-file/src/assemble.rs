@@ -17,6 +17,7 @@ use crate::values::{NameOrList, NumberOrList};
 use ftc_control::parameters;
 use ftc_design::assembly::{DatabaseSource, EstimatorSpec, KnownDisturbance, Request, Threshold};
 use ftc_design::{ControlSpec, HypothesesSpec, Lyapunov, Objective, ObserverSpec, Signal, Signals};
+use ftc_plant::scaling::{Known, Scaling};
 use ftc_plant::scenario::{ModeInterval, Waveform};
 use ftc_plant::{Dimensions, OperatingPoint, Scenario, SwitchedPlant};
 use std::path::Path;
@@ -111,12 +112,14 @@ fn signals(given: &schema::Signals, found: &plant::Found) -> Result<Signals, Str
     let own = dims.states - found.held_inputs;
     let mut states = channels("states", "x", &given.states, own, &points(|p| &p.x))?;
     states.extend(inputs.iter().take(found.held_inputs).map(held));
-    Ok(Signals {
+    let mut signals = Signals {
         inputs,
         outputs,
         states,
         disturbances: Vec::new(),
-    })
+    };
+    complete_nominal_values(&mut signals, plant);
+    Ok(signals)
 }
 
 /// The state that remembers an input.
@@ -196,10 +199,55 @@ fn signal(info: &SignalInfo, default_name: String, operating: f64) -> Result<Sig
     Ok(Signal {
         name,
         unit,
-        nominal: info.nominal.or(operating).or(range).unwrap_or(1.0),
+        nominal: info.nominal.or(operating).or(range).unwrap_or(UNKNOWN),
         min,
         max,
     })
+}
+
+/// Marks a nominal value of which nothing is known until the plant has been looked at.
+const UNKNOWN: f64 = f64::NAN;
+
+/// A plant whose balanced magnitudes are all nearer to 1 than this factor is left in its units.
+const UNLIKE: f64 = 1e3;
+
+/// Gives every signal without a nominal value one: 1, or that of the balanced plant where any is far
+/// from 1. Those that are known stay as they are.
+fn complete_nominal_values(signals: &mut Signals, plant: &SwitchedPlant) {
+    let known = |signals: &[Signal]| -> Vec<Option<f64>> {
+        let nominal = signals.iter().map(|signal| signal.nominal);
+        nominal
+            .map(|value| value.is_finite().then_some(value))
+            .collect()
+    };
+    let found = Scaling::completed(
+        plant,
+        &Known {
+            states: known(&signals.states),
+            inputs: known(&signals.inputs),
+            outputs: known(&signals.outputs),
+        },
+    );
+    let mut unknown: Vec<(&mut f64, f64)> = [
+        (&mut signals.states, found.states),
+        (&mut signals.inputs, found.inputs),
+        (&mut signals.outputs, found.outputs),
+    ]
+    .into_iter()
+    .flat_map(|(signals, found)| signals.iter_mut().map(|s| &mut s.nominal).zip(found))
+    .filter(|(nominal, _)| !nominal.is_finite())
+    .collect();
+    let far = unknown
+        .iter()
+        .any(|(_, found)| !(1.0 / UNLIKE..=UNLIKE).contains(found));
+    for (nominal, found) in &mut unknown {
+        **nominal = if far { two_digits(*found) } else { 1.0 };
+    }
+}
+
+/// The nearest number with two significant digits, so that what is printed is what is meant.
+fn two_digits(value: f64) -> f64 {
+    format!("{value:.1e}").parse().unwrap_or(1.0)
 }
 
 fn control(

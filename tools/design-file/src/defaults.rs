@@ -9,7 +9,7 @@
 //! | `mode.operating_point` | zero |
 //! | `signals.*.name` | `u[1]`, `y[1]`, `x[1]` ... |
 //! | `signals.*.unit` | none |
-//! | `signals.*.nominal` | the largest value of this signal among the operating points; if that is 0, half of `max - min`; if there is none, 1 |
+//! | `signals.*.nominal` | the largest value of this signal among the operating points; if that is 0, half of `max - min`; if there is none, 1, unless balancing the plant about the known values puts one of these signals beyond a factor of 1000 from 1: then what balancing gives |
 //! | `signals.*.min`, `max` | unbounded |
 //! | `disturbance` | no periodic disturbance is learned on line |
 //! | `disturbance.amplitude` | unknown: learning starts from nothing |
@@ -63,7 +63,7 @@ pub const FEEDFORWARD: bool = true;
 /// `observer.kind`
 pub const OBSERVER: ObserverKind = ObserverKind::Auto;
 /// `estimator.method`
-pub const ESTIMATOR: EstimatorMethod = EstimatorMethod::Observer;
+pub const ESTIMATOR: EstimatorMethod = EstimatorMethod::Reference;
 /// `estimator.database`
 pub const DATABASE: DatabaseSource = DatabaseSource::Commission;
 /// `estimator.sigmas`

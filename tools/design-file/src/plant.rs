@@ -292,13 +292,13 @@ impl<'a> Source<'a> {
             (Some(Matrix::Name(variable)), Some((file, found))) => {
                 let path = self.path(variable);
                 let variable = if found.holds(&path) { &path } else { variable };
-                self.from_file(file, found, variable).map(Some)
+                read_matrix(file, found, variable).map(Some)
             }
             (None, Some((file, found))) => {
                 let Some(path) = self.usual(name, found) else {
                     return Ok(None);
                 };
-                let matrix = self.from_file(file, found, &path)?;
+                let matrix = read_matrix(file, found, &path)?;
                 // MATLAB writes [] for what a model does not have.
                 let absent = matrix.is_empty() && !matches!(name, "A" | "B" | "C");
                 Ok((!absent).then_some(matrix))
@@ -335,13 +335,14 @@ impl<'a> Source<'a> {
             .map(|name| format!("{model}.{name}"))
             .find(|path| found.holds(path))
     }
+}
 
-    fn from_file(&self, file: &str, found: &Matrices, name: &str) -> Result<DMatrix<f64>, String> {
-        let matrix = found
-            .matrix(name)
-            .map_err(|what| format!("file = \"{file}\" {what}"))?;
-        sound(&format!("file = \"{file}\": {name}"), matrix)
-    }
+/// The matrix of that name in the file, finite.
+fn read_matrix(file: &str, found: &Matrices, name: &str) -> Result<DMatrix<f64>, String> {
+    let matrix = found
+        .matrix(name)
+        .map_err(|what| format!("file = \"{file}\" {what}"))?;
+    sound(&format!("file = \"{file}\": {name}"), matrix)
 }
 
 fn mode(source: &Source, number: usize, disturbances: usize) -> Result<Given, String> {

@@ -347,7 +347,15 @@ pub fn json(design: &Design, warnings: &[String]) -> String {
 
 /// The same object when there is no design.
 pub fn json_of_failure(asked: &ControlSpec, error: &DesignError) -> String {
-    let (feasible, blocks, advice) = match error {
+    let (cause, control, observer) = match error {
+        DesignError::Partial(partial) => (
+            &partial.error,
+            partial.state_feedback.as_ref(),
+            partial.observer.as_ref(),
+        ),
+        whole => (whole, None, None),
+    };
+    let (feasible, blocks, advice) = match cause {
         DesignError::Infeasible(infeasibility) => (
             Value::Bool(false),
             infeasibility
@@ -360,7 +368,7 @@ pub fn json_of_failure(asked: &ControlSpec, error: &DesignError) -> String {
         DesignError::Uncertified(uncertified) => {
             (Value::Bool(true), Vec::new(), uncertified.advice.as_slice())
         }
-        DesignError::Request(_) | DesignError::Solver(_) => {
+        DesignError::Request(_) | DesignError::Solver(_) | DesignError::Partial(_) => {
             (Value::Null, Vec::new(), [].as_slice())
         }
     };
@@ -368,10 +376,15 @@ pub fn json_of_failure(asked: &ControlSpec, error: &DesignError) -> String {
     pretty(&json!({
         "feasible": feasible,
         "certified": false,
-        "gamma": null,
+        "gamma": control.and_then(|c| c.gamma.clone()),
         "decay": asked.decay,
-        "spectral_radius": null,
-        "dwell_time_samples": null,
+        "spectral_radius": control.map(|c| c.spectral_radius.clone()),
+        "dwell_time_samples": control.and_then(|c| c.dwell.map(|dwell| dwell.samples)),
+        "observer": observer.map(|observer| json!({
+            "kind": observer.observer.kind,
+            "decay": observer.spec.decay,
+            "spectral_radius": observer.spectral_radius,
+        })),
         "lyapunov": asked.lyapunov,
         "latency": asked.latency,
         "blocks": blocks,

@@ -244,6 +244,7 @@ impl Sub for &Enclosure {
     type Output = Enclosure;
 
     /// Contains every difference of members.
+    #[allow(clippy::suspicious_arithmetic_impl)]
     fn sub(self, other: &Enclosure) -> Enclosure {
         self + &other.negative()
     }

@@ -13,7 +13,7 @@ enum Shape {
 }
 
 /// A handle to an unknown matrix of a [`Problem`](super::Problem).
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Variable {
     first: usize,
     rows: usize,
@@ -40,6 +40,16 @@ impl Variable {
             columns,
             shape: Shape::Full,
         }
+    }
+
+    /// Rows and columns.
+    pub(super) fn shape(&self) -> (usize, usize) {
+        (self.rows, self.columns)
+    }
+
+    /// Whether entry (r, c) is the scalar of entry (c, r).
+    pub(super) fn is_symmetric(&self) -> bool {
+        self.shape == Shape::Symmetric
     }
 
     /// How many scalars it has.
@@ -98,7 +108,7 @@ impl Variable {
 }
 
 /// `left X right` or `left X' right` for an unknown `X`.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, PartialEq)]
 struct Term {
     left: DMatrix<f64>,
     variable: Variable,
@@ -107,7 +117,7 @@ struct Term {
 }
 
 /// A matrix that is affine in the unknowns: a constant plus terms `L X R` and `L X' R`.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct Affine {
     constant: DMatrix<f64>,
     terms: Vec<Term>,
@@ -136,6 +146,23 @@ impl Affine {
             constant: self.constant.transpose(),
             terms: terms.collect(),
         }
+    }
+
+    /// The unknown this is, if it is an unknown and nothing else.
+    pub(super) fn as_variable(&self) -> Option<Variable> {
+        let [term] = self.terms.as_slice() else {
+            return None;
+        };
+        let plain = *self == Self::from(&term.variable);
+        plain.then_some(term.variable)
+    }
+
+    /// The terms `left X right`, or `left X' right` where the flag says so.
+    pub(super) fn products(
+        &self,
+    ) -> impl Iterator<Item = (Variable, bool, &DMatrix<f64>, &DMatrix<f64>)> {
+        let terms = self.terms.iter();
+        terms.map(|term| (term.variable, term.transposed, &term.left, &term.right))
     }
 
     /// The constant part of entry (row, column).

@@ -6,6 +6,7 @@
 //! scalar; [`Problem::margin`] decides feasibility, which an interior-point solver alone does not
 //! do on strict inequalities.
 
+mod congruences;
 mod conic;
 mod expression;
 mod problem;

@@ -1,5 +1,6 @@
 //! Problems over linear matrix inequalities, and the margin problem that decides feasibility.
 
+use super::congruences;
 use super::conic::{self, Conic};
 use super::expression::{Affine, Variable};
 use crate::verdict::{BlockName, SolverFailure};
@@ -64,10 +65,14 @@ impl Inequality {
 /// Unknowns, inequalities and linear equations between scalars.
 #[derive(Clone, Debug, Default)]
 pub struct Problem {
-    scalars: usize,
-    inequalities: Vec<Inequality>,
-    equations: Vec<Affine>,
-    bounds: Vec<Affine>,
+    pub(super) scalars: usize,
+    pub(super) variables: Vec<Variable>,
+    pub(super) inequalities: Vec<Inequality>,
+    pub(super) equations: Vec<Affine>,
+    pub(super) bounds: Vec<Affine>,
+    /// The unknowns whose traces add up to a given value, and that value; `None` in the place of an
+    /// expression that is no unknown alone.
+    pub(super) normalised: Option<(Vec<Option<Variable>>, f64)>,
 }
 
 /// What the solver came back with: to be judged, not trusted.
@@ -100,6 +105,7 @@ impl Problem {
 
     fn register(&mut self, variable: Variable) -> Variable {
         self.scalars += variable.count();
+        self.variables.push(variable);
         variable
     }
 
@@ -125,6 +131,8 @@ impl Problem {
 
     /// Demands that the sum of the diagonals of these square expressions equal `value`.
     pub fn require_trace(&mut self, expressions: &[Affine], value: f64) {
+        let unknowns = expressions.iter().map(Affine::as_variable).collect();
+        self.normalised = Some((unknowns, value));
         self.equations.push(trace(expressions) - number(value));
     }
 
@@ -159,9 +167,20 @@ impl Problem {
     /// normalised (see [`Problem::require_trace`]) this problem always has a strictly feasible point,
     /// and a negative or vanishing optimum means that the inequalities conflict.
     ///
+    /// Solved by the interior-point method that uses the structure where there is one, else by the
+    /// general solver.
+    ///
     /// # Errors
     /// When the solver returns nothing that could be a solution.
     pub fn margin(&self) -> Result<Margin, SolverFailure> {
+        congruences::margin(self).map_or_else(|| self.margin_by_general_solver(), Ok)
+    }
+
+    /// [`Problem::margin`] by the general solver alone.
+    ///
+    /// # Errors
+    /// When the solver returns nothing that could be a solution.
+    pub fn margin_by_general_solver(&self) -> Result<Margin, SolverFailure> {
         let t = self.scalars;
         let mut cost = vec![0.0; t + 1];
         cost[t] = -1.0;

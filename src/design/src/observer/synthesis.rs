@@ -9,7 +9,7 @@ use crate::augmented::scaled;
 use crate::certificate::{LyapunovMatrix, observer_growth};
 use crate::lmi::{Affine, Inequality, Problem, Variable};
 use crate::matrices::plain;
-use crate::units::power_of_two;
+use crate::units::{other_scaling, power_of_two};
 use crate::verdict::{BlockKind, BlockName, DesignError, SolverFailure, infeasible};
 use crate::{Advice, DwellTime, Lyapunov, ObserverChoice, ObserverSpec};
 use ftc_control::Matrix;
@@ -34,6 +34,16 @@ pub fn synthesise(
 ) -> Result<ObserverDesign, DesignError> {
     Dimensions::check(plant).map_err(DesignError::Request)?;
     spec.check().map_err(DesignError::Request)?;
+    let first = chosen(plant, spec, scaling);
+    first.or_else(|error| chosen(plant, spec, &other_scaling(plant, scaling)).or(Err(error)))
+}
+
+/// The observer of the kind that is asked for, in one scaling.
+fn chosen(
+    plant: &SwitchedPlant,
+    spec: &ObserverSpec,
+    scaling: &Scaling,
+) -> Result<ObserverDesign, DesignError> {
     match spec.kind {
         ObserverChoice::Uio => unknown_input(plant, spec, scaling),
         ObserverChoice::Luenberger => luenberger(plant, spec, scaling, None),
@@ -135,9 +145,6 @@ fn units(scaling: &Scaling) -> OwnedUnits {
     }
 }
 
-/// Beyond it a magnitude is printed as 1.0000, which no observer decay can exceed.
-const LARGEST_PRINTED: f64 = 0.999_95;
-
 /// The error dynamics in per-unit: `T_ij A_i` for every pair, `C_i` for every mode.
 struct ErrorModel {
     projected: Vec<Vec<DMatrix<f64>>>,
@@ -163,9 +170,10 @@ impl ErrorModel {
         for (i, j) in spec.lyapunov.observer_pairs(self.outputs.len()) {
             let found = check_detectable(&self.projected[i][j], &self.outputs[i], spec.decay);
             if let Err(magnitude) = found {
-                let reason = match magnitude < LARGEST_PRINTED {
-                    true => format!("ask for an observer decay above {magnitude:.4}"),
-                    false => "use a luenberger observer or more sensors".into(),
+                let above = (magnitude * 1e4).ceil() / 1e4;
+                let reason = match above < 1.0 {
+                    true => format!("ask for an observer.decay above {above:.4}"),
+                    false => "use a luenberger observer (observer.kind) or more sensors".into(),
                 };
                 return Err(DesignError::Request(format!(
                     "no observer of this kind reaches decay {} in mode {}: (C, T A) has an eigenvalue of magnitude \
@@ -555,7 +563,7 @@ fn advice(spec: &ObserverSpec, works: &dyn Fn(&ObserverSpec) -> bool) -> Vec<Adv
                 ..spec.clone()
             })
     });
-    let mut advice: Vec<Advice> = slower.map(Advice::Decay).into_iter().collect();
-    advice.extend(other.map(|&lyapunov| Advice::Lyapunov(lyapunov)));
+    let mut advice: Vec<Advice> = slower.map(Advice::ObserverDecay).into_iter().collect();
+    advice.extend(other.map(|&lyapunov| Advice::ObserverLyapunov(lyapunov)));
     advice
 }

@@ -35,10 +35,9 @@ pub(super) fn gain(subject: &Subject, tolerance: f64) -> Option<SwitchingGain> {
         Lyapunov::Switched => &[false, true],
         Lyapunov::Common | Lyapunov::Dwell => &[false],
     };
-    let found = kinds
+    kinds
         .iter()
-        .find_map(|&each| attempt(subject, &loops, each).filter(|found| found.gamma <= largest));
-    found
+        .find_map(|&each| attempt(subject, &loops, each).filter(|found| found.gamma <= largest))
 }
 
 /// With one matrix for each mode, or one for all.

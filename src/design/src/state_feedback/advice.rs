@@ -1,13 +1,18 @@
 //! Which change of an infeasible request helps: each is followed to certified gains before it is given.
 
 use super::synthesis::succeeds;
-use crate::{Advice, ControlSpec};
+use crate::{Advice, ControlSpec, Run};
 use ftc_plant::SwitchedPlant;
 use ftc_plant::scaling::Scaling;
 
 /// Tries the usual ways out, one per kind, cheapest change first.
-pub(super) fn search(plant: &SwitchedPlant, spec: &ControlSpec, scaling: &Scaling) -> Vec<Advice> {
-    let works = |candidate: &ControlSpec| succeeds(plant, candidate, scaling);
+pub(super) fn search(
+    plant: &SwitchedPlant,
+    spec: &ControlSpec,
+    scaling: &Scaling,
+    run: &Run,
+) -> Vec<Advice> {
+    let works = |candidate: &ControlSpec| succeeds(plant, candidate, scaling, run);
     let mut advice = Vec::new();
     let slower = slowest_step(spec, &works);
     advice.extend(slower.map(Advice::Decay));

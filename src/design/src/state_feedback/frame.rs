@@ -103,6 +103,21 @@ impl Frame {
         Some(Self::of(models, &parts)?.with_inputs(models, &parts))
     }
 
+    /// The same with the units in which the disturbance and the state's part of the performance
+    /// signal are at most one.
+    pub fn with_signals(mut self, models: &[AugmentedMode], group: &[usize]) -> Self {
+        let largest = |norms: &mut dyn Iterator<Item = f64>| {
+            let norm = norms.fold(0.0, f64::max);
+            if norm > 0.0 { norm } else { 1.0 }
+        };
+        let (basis, inverse) = (&self.basis, &self.inverse);
+        let entering = |&mode: &usize| (inverse * &models[mode].e).norm();
+        let leaving = |&mode: &usize| (&models[mode].h * basis).norm();
+        self.disturbance = largest(&mut group.iter().map(entering));
+        self.performance = largest(&mut group.iter().map(leaving));
+        self
+    }
+
     /// Coordinates from a stabilising solution, with the units in which disturbance and closed-loop
     /// performance signal are near one.
     pub fn of_stabilised(models: &[AugmentedMode], parts: &[Part]) -> Option<Self> {

@@ -6,19 +6,21 @@
 
 use super::advice;
 use super::frame::{Frame, Part};
+use super::structured;
 use super::theorem;
 use super::{ModeGains, REJECTION, StateFeedback};
 use crate::augmented::{AugmentedMode, augment, scaled};
 use crate::certificate::{ControlCertificate, FactoredLyapunov, provable_dwell};
 use crate::lmi::Margin;
+use crate::units::other_scaling;
 use crate::verdict::{DesignError, SolverFailure, infeasible};
-use crate::{ControlSpec, Lyapunov, Objective, Units};
+use crate::{ControlSpec, Lyapunov, Objective, Run, Solver, Step, Units};
 use ftc_plant::scaling::Scaling;
 use ftc_plant::{Dimensions, SwitchedPlant, spectral_radius};
 use nalgebra::DMatrix;
 
 /// Relative sacrifices of `g = gamma^2` for a margin, tried in turn until the certificate holds.
-const SACRIFICES: [f64; 6] = [2e-5, 1e-4, 1e-3, 1e-2, 1e-1, 1.0];
+pub(super) const SACRIFICES: [f64; 6] = [2e-5, 1e-4, 1e-3, 1e-2, 1e-1, 1.0];
 
 /// A margin below this is no margin: the solver's own accuracy.
 const SMALLEST_MARGIN: f64 = 1e-9;
@@ -30,10 +32,10 @@ const SURE_MARGIN: f64 = 1e-6;
 const THICK_MARGIN: f64 = 1e-2;
 
 /// How often better coordinates are sought.
-const REFRAMINGS: usize = 12;
+pub(super) const REFRAMINGS: usize = 12;
 
 /// A least level that better coordinates change by less than this, relatively, is the least.
-const AGREEMENT: f64 = 1e-5;
+pub(super) const AGREEMENT: f64 = 1e-5;
 
 /// Designs the state feedback that is asked for and proves it.
 ///
@@ -47,9 +49,28 @@ pub fn synthesise(
     spec: &ControlSpec,
     scaling: &Scaling,
 ) -> Result<StateFeedback, DesignError> {
-    attempt(plant, spec, scaling).map_err(|mut error| {
+    synthesise_with(plant, spec, scaling, &Run::default())
+}
+
+/// [`synthesise`] with a chosen solver and someone who watches. A verdict that there is no design is
+/// given only after another scaling has confirmed it.
+///
+/// # Errors
+/// As [`synthesise`].
+pub fn synthesise_with(
+    plant: &SwitchedPlant,
+    spec: &ControlSpec,
+    scaling: &Scaling,
+    run: &Run,
+) -> Result<StateFeedback, DesignError> {
+    let first = attempt(plant, spec, scaling, run);
+    let confirmed = first.or_else(|error| match error {
+        DesignError::Request(_) => Err(error),
+        doubtful => attempt(plant, spec, &other_scaling(plant, scaling), run).or(Err(doubtful)),
+    });
+    confirmed.map_err(|mut error| {
         if let Some(advice) = error.advice_mut() {
-            *advice = advice::search(plant, spec, scaling);
+            *advice = advice::search(plant, spec, scaling, run);
         }
         error
     })
@@ -60,6 +81,7 @@ fn attempt(
     plant: &SwitchedPlant,
     spec: &ControlSpec,
     scaling: &Scaling,
+    run: &Run,
 ) -> Result<StateFeedback, DesignError> {
     let dims = Dimensions::check(plant).map_err(DesignError::Request)?;
     spec.check(dims).map_err(DesignError::Request)?;
@@ -67,54 +89,130 @@ fn attempt(
     let road = Road {
         plant,
         spec,
+        run: *run,
         models: augment(plant, spec, &units),
         units,
     };
-    let mut stable = Vec::new();
-    for group in road.groups() {
-        match road.stabilised(&group)? {
-            Verdict::Stable(parts) => stable.push(parts),
-            Verdict::Conflict(margin) => {
-                return Err(infeasible(margin.margin, margin.weights));
-            }
-        }
-    }
     let disturbed = road.models.iter().any(|model| model.e.amax() > 0.0);
-    match spec.objective {
-        Objective::Attenuation if disturbed => road.attenuate(&stable),
-        Objective::Attenuation | Objective::Decay => road.certified(stable.concat(), None),
+    let optimised = spec.objective == Objective::Attenuation && disturbed;
+    if !(optimised && run.solver == Solver::Structured) {
+        return road.step_by_step(optimised);
     }
+    let Some(direct) = road.direct() else {
+        return road.step_by_step(true);
+    };
+    if is_sharp(&direct) || !road.is_small() {
+        return Ok(direct);
+    }
+    (run.watch)(Step::GeneralSolver);
+    let general = Road {
+        run: Run {
+            solver: Solver::General,
+            ..*run
+        },
+        ..road
+    };
+    Ok(match general.step_by_step(true) {
+        Ok(other) if is_sharp(&other) || largest_gamma(&other) < largest_gamma(&direct) => other,
+        _ => direct,
+    })
+}
+
+/// Whether every mode's gamma is known to be the optimum to four digits, or as good as zero.
+fn is_sharp(design: &StateFeedback) -> bool {
+    const SHARP: f64 = 1e-4;
+    let pairs = design
+        .gamma
+        .iter()
+        .flatten()
+        .zip(design.optimum.iter().flatten());
+    let units = &design.certificate.units;
+    let rejection = 2.0 * REJECTION * units.performance / units.disturbance;
+    let sharp =
+        |(gamma, optimum): (&f64, &f64)| *gamma < (1.0 + SHARP) * optimum || *gamma < rejection;
+    pairs.into_iter().all(sharp)
+}
+
+fn largest_gamma(design: &StateFeedback) -> f64 {
+    let gamma = design.gamma.iter().flatten().copied();
+    gamma.fold(0.0, f64::max)
 }
 
 /// Whether a request leads all the way to certified gains. The cheap question comes first: whether
 /// decay and guarantee can be had at all.
-pub(super) fn succeeds(plant: &SwitchedPlant, spec: &ControlSpec, scaling: &Scaling) -> bool {
+pub(super) fn succeeds(
+    plant: &SwitchedPlant,
+    spec: &ControlSpec,
+    scaling: &Scaling,
+    run: &Run,
+) -> bool {
     let units = Units::choose(plant, spec, scaling);
     let models = augment(plant, spec, &units);
     let stabilised = spec.lyapunov.groups(models.len()).iter().all(|group| {
-        let found = stable(&models, spec, group);
+        let found = stable(&models, spec, group, run);
         found.is_ok_and(|(margin, parts)| parts.is_some() && margin.margin >= SURE_MARGIN)
     });
-    stabilised && attempt(plant, spec, scaling).is_ok()
+    stabilised && attempt(plant, spec, scaling, run).is_ok()
+}
+
+/// Gains with their margin.
+type Stabilised = (Margin, Vec<Part>);
+
+/// (T1) by the general solver, or by the one that uses the structure.
+fn stabilise(
+    solver: Solver,
+    models: &[AugmentedMode],
+    spec: &ControlSpec,
+    group: &[usize],
+    run: &Run,
+) -> Result<Stabilised, SolverFailure> {
+    match solver {
+        Solver::Structured => structured::stabilise(models, spec, group, run),
+        Solver::General => theorem::stabilise(models, spec, group),
+    }
 }
 
 /// Stabilising gains of a group with their margin, sought in the design's coordinates and, where
-/// these show hardly any, in those of a regulator; no gains where neither does.
+/// these show hardly any, in those of a regulator; no gains where neither does. The general solver is
+/// asked where the other one gives no clear answer.
 fn stable(
     models: &[AugmentedMode],
     spec: &ControlSpec,
     group: &[usize],
+    run: &Run,
 ) -> Result<(Margin, Option<Vec<Part>>), SolverFailure> {
-    let plain = match theorem::stabilise(models, spec, group) {
+    if run.solver == Solver::Structured {
+        if let Ok(answer) = stable_by(Solver::Structured, models, spec, group, run) {
+            return Ok(answer);
+        }
+        (run.watch)(Step::GeneralSolver);
+    }
+    stable_by(Solver::General, models, spec, group, run)
+}
+
+/// [`stable`] by one solver.
+fn stable_by(
+    solver: Solver,
+    models: &[AugmentedMode],
+    spec: &ControlSpec,
+    group: &[usize],
+    run: &Run,
+) -> Result<(Margin, Option<Vec<Part>>), SolverFailure> {
+    let plain = match stabilise(solver, models, spec, group, run) {
         Ok((margin, parts)) if margin.margin >= SURE_MARGIN => return Ok((margin, Some(parts))),
         uncertain => uncertain,
     };
-    let regulated = Frame::of_regulated(models, group, spec.decay).and_then(|frame| {
-        let (margin, parts) = theorem::stabilise(&frame.view(models), spec, group).ok()?;
-        (margin.margin >= SURE_MARGIN).then(|| (margin, frame.restore(parts)))
+    let regulated = Frame::of_regulated(models, group, spec.decay).map(|frame| {
+        let found = stabilise(solver, &frame.view(models), spec, group, run);
+        found.map(|(margin, parts)| (margin, frame.restore(parts)))
     });
-    if let Some((margin, parts)) = regulated {
-        return Ok((margin, Some(parts)));
+    match regulated {
+        Some(Ok((margin, parts))) if margin.margin >= SURE_MARGIN => {
+            return Ok((margin, Some(parts)));
+        }
+        // Both must have an answer, unless the other solver has been asked already.
+        Some(Err(failure)) if solver == Solver::Structured => return Err(failure),
+        _ => {}
     }
     let (margin, parts) = plain?;
     let shown = margin.margin >= SMALLEST_MARGIN;
@@ -127,15 +225,15 @@ fn thickened(
     models: &[AugmentedMode],
     spec: &ControlSpec,
     group: &[usize],
-    mut margin: Margin,
-    mut parts: Vec<Part>,
-) -> (Margin, Vec<Part>) {
+    (mut margin, mut parts): Stabilised,
+    run: &Run,
+) -> Stabilised {
     for _ in 0..REFRAMINGS {
         let frame = Frame::of_stabilised(models, &parts);
         let Some(frame) = frame.filter(|_| margin.margin < THICK_MARGIN) else {
             break;
         };
-        match theorem::stabilise(&frame.view(models), spec, group) {
+        match stabilise(run.solver, &frame.view(models), spec, group, run) {
             Ok((better, found)) if better.margin > 2.0 * margin.margin => {
                 (margin, parts) = (better, frame.restore(found));
             }
@@ -152,34 +250,53 @@ enum Verdict {
 }
 
 /// The least level of a group.
-struct Optimum {
+pub(super) struct Optimum {
     /// `g = gamma^2` in the design's units.
-    level: f64,
+    pub level: f64,
     /// No `g` is below this, as the solver sees it; zero where it does not tell.
-    bound: f64,
+    pub bound: f64,
     /// Coordinates in which the solution is near the identity.
-    frame: Frame,
+    pub frame: Frame,
 }
 
 /// What every stage works on.
-struct Road<'a> {
+pub(super) struct Road<'a> {
     plant: &'a SwitchedPlant,
-    spec: &'a ControlSpec,
+    pub spec: &'a ControlSpec,
+    pub run: Run<'a>,
     units: Units,
-    models: Vec<AugmentedMode>,
+    pub models: Vec<AugmentedMode>,
 }
 
 impl Road<'_> {
     /// Modes that share a problem.
-    fn groups(&self) -> Vec<Vec<usize>> {
+    pub fn groups(&self) -> Vec<Vec<usize>> {
         self.spec.lyapunov.groups(self.models.len())
+    }
+
+    /// Step by step: stabilising gains first, which decides feasibility, then the least level from there.
+    fn step_by_step(&self, optimised: bool) -> Result<StateFeedback, DesignError> {
+        let mut stable = Vec::new();
+        for group in self.groups() {
+            match self.stabilised(&group)? {
+                Verdict::Stable(parts) => stable.push(parts),
+                Verdict::Conflict(margin) => {
+                    return Err(infeasible(margin.margin, margin.weights));
+                }
+            }
+        }
+        match optimised {
+            true => self.attenuate(&stable),
+            false => self.certified(stable.concat(), None),
+        }
     }
 
     /// Stabilising gains of a group (T1).
     fn stabilised(&self, group: &[usize]) -> Result<Verdict, SolverFailure> {
-        Ok(match stable(&self.models, self.spec, group)? {
+        Ok(match stable(&self.models, self.spec, group, &self.run)? {
             (margin, Some(parts)) => {
-                Verdict::Stable(thickened(&self.models, self.spec, group, margin, parts).1)
+                let found = (margin, parts);
+                Verdict::Stable(thickened(&self.models, self.spec, group, found, &self.run).1)
             }
             (margin, None) => Verdict::Conflict(margin),
         })
@@ -192,6 +309,12 @@ impl Road<'_> {
         let (size, inputs) = models[0].b.shape();
         let mut frame =
             Frame::of_stabilised(models, start).unwrap_or_else(|| Frame::identity(size, inputs));
+        if self.run.solver == Solver::Structured {
+            if let Some(found) = self.settled_level(&frame, group) {
+                return Ok(found.optimum);
+            }
+            (self.run.watch)(Step::GeneralSolver);
+        }
         let (mut least, mut bound): (Option<f64>, f64) = (None, 0.0);
         for _ in 0..REFRAMINGS {
             let floor = frame.view_level(REJECTION.powi(2));
@@ -246,15 +369,24 @@ impl Road<'_> {
         let mut parts = Vec::new();
         for (group, least) in groups.iter().zip(least) {
             let (frame, level) = (&least.frame, levels.set(group, least, sacrifice));
-            let view = frame.view(&self.models);
-            let found = theorem::centred(&view, self.spec, group, frame.view_level(level))?;
-            parts.extend(frame.restore(found));
+            let structured = match self.run.solver {
+                Solver::Structured => self.direct_centre(group, frame, level),
+                Solver::General => None,
+            };
+            parts.extend(match structured {
+                Some(found) => found,
+                None => {
+                    let view = frame.view(&self.models);
+                    let level = frame.view_level(level);
+                    frame.restore(theorem::centred(&view, self.spec, group, level)?)
+                }
+            });
         }
         self.certified(parts, Some(levels))
     }
 
     /// Puts the parts together in physical units, and proves the whole.
-    fn certified(
+    pub fn certified(
         &self,
         parts: Vec<Part>,
         levels: Option<Levels>,
@@ -292,7 +424,7 @@ impl Road<'_> {
 }
 
 /// `gamma` per mode, in the user's units.
-struct Levels {
+pub(super) struct Levels {
     gamma: Vec<f64>,
     optimum: Vec<f64>,
     /// What one unit of `gamma` in the design's units is to the user.
@@ -300,7 +432,7 @@ struct Levels {
 }
 
 impl Levels {
-    fn new(road: &Road) -> Self {
+    pub fn new(road: &Road) -> Self {
         let modes = road.models.len();
         Self {
             gamma: vec![0.0; modes],
@@ -311,7 +443,7 @@ impl Levels {
 
     /// Notes the least level `g` of a group, gives up `sacrifice` of it, and returns the `g` that is
     /// left to prove.
-    fn set(&mut self, group: &[usize], least: &Optimum, sacrifice: f64) -> f64 {
+    pub fn set(&mut self, group: &[usize], least: &Optimum, sacrifice: f64) -> f64 {
         let relaxed = least.level * (1.0 + sacrifice);
         for &mode in group {
             self.optimum[mode] = least.bound.sqrt() * self.physical;

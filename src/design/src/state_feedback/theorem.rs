@@ -181,7 +181,7 @@ pub(super) fn stabilise(
     group: &[usize],
 ) -> Result<(Margin, Vec<Part>), SolverFailure> {
     let (problem, unknowns) = stability(models, spec, group);
-    let margin = problem.margin()?;
+    let margin = problem.margin_by_general_solver()?;
     let mut parts = read(group, &unknowns, &margin.scalars)?;
     for part in &mut parts {
         // Nothing in (T1) holds down what the inputs do to no state: take it out.
@@ -289,5 +289,9 @@ pub(super) fn centred(
     require_decay(&mut problem, models, spec, group, &unknowns);
     let (matrices, total) = matrices(spec.lyapunov, &unknowns, models);
     problem.require_trace_below(&matrices, ROOM * total);
-    read(group, &unknowns, &problem.margin()?.scalars)
+    read(
+        group,
+        &unknowns,
+        &problem.margin_by_general_solver()?.scalars,
+    )
 }

@@ -1,5 +1,8 @@
 //! One hypothesis: who is faulty, and a Kalman filter of `[x; d; l; g; f]` under that assumption.
 
+// Matrices are flat and addressed by row and column, as in the equations.
+#![allow(clippy::needless_range_loop)]
+
 use super::linear::{axpy, dot, factor, solve};
 use super::model::{Layout, ModeModel};
 use crate::kernel::bounded;
@@ -539,7 +542,7 @@ impl Hypothesis {
             if (0.0..=most).contains(&variance) {
                 continue;
             }
-            if !(variance > most) {
+            if variance.is_nan() || variance < 0.0 {
                 // Cancellation has spoilt it: start anew.
                 let fresh = if k < n {
                     settings.start_elsewhere[k] * settings.start_elsewhere[k]
