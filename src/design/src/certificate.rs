@@ -111,7 +111,6 @@ impl ClosedLoop {
     }
 }
 
-#[cfg(feature = "solver")]
 impl FactoredLyapunov {
     /// `S` itself, with `L = I`.
     pub(crate) fn plain(core: DMatrix<f64>) -> Self {

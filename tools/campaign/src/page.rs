@@ -344,7 +344,7 @@ pub fn json(whole: &Partial, asked: u64) -> Value {
     })
 }
 
-/// What a program printed by [`json`], read back.
+/// What a program printed by [`json()`], read back.
 ///
 /// # Errors
 /// The end of a sentence that begins with the file's name.

@@ -1,7 +1,7 @@
 //! Pages an engineer would forward: figures, tables and sentences in one self-contained file.
 //!
-//! A [`figure`] is plain data and becomes SVG in [`svg`]; a [`page`] is made of sections that hold
-//! figures, tables and key numbers; [`demo`] is the page of one simulated design. Nothing here
+//! A [`figure`] is plain data and becomes SVG; a [`mod@page`] is made of sections that hold
+//! figures, tables and key numbers; `demo` is the page of one simulated design. Nothing here
 //! needs a network or a script, and one file reads well in light, in dark, on a phone and on paper.
 //!
 //! SVG is written with the same template crate as the page. One plotting crate (kuva) was tried, one
