@@ -136,7 +136,10 @@ def main() -> int:
     parser.add_argument("--alone", action="store_true", help="leave out the general solvers")
     arguments = parser.parse_args()
     lines = [
-        "| states | modes | guarantee | `ftc-fmu design`, s | allowed, s | gamma, mode 1 | Clarabel, s (gamma) | SDPA, s (gamma) |",
+        (
+            "| states | modes | guarantee | `ftc-fmu design`, s | allowed, s | gamma, mode 1 "
+            "| Clarabel, s (gamma) | SDPA, s (gamma) |"
+        ),
         "|---|---|---|---|---|---|---|---|",
     ]
     missed = 0
@@ -148,7 +151,8 @@ def main() -> int:
         general = [others(task, solver) if asked else "-" for solver in ("CLARABEL", "SDPA")]
         missed += seconds > allowed
         lines.append(
-            f"| {states} | {modes} | {lyapunov} | {seconds:.2f} | {allowed:g} | {gamma[0]:.5f} | {general[0]} | {general[1]} |"
+            f"| {states} | {modes} | {lyapunov} | {seconds:.2f} | {allowed:g} | {gamma[0]:.5f} "
+            f"| {general[0]} | {general[1]} |"
         )
         print(lines[-1], flush=True)
     if arguments.write:

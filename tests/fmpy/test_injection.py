@@ -58,6 +58,11 @@ class Plant:
         self.fmu.doStep(self.tick * self.step, self.step)
         self.tick += 1
 
+    def advance_under(self, kind: int, size: float) -> None:
+        """Puts a fault on the first sensor and takes one step."""
+        self.inject(kind, size)
+        self.advance()
+
     def rows(self) -> Iterator[tuple[int, float, float, float]]:
         """Yields tick, reading, true output and fault of the first sensor, 16 samples long."""
         for _ in range(16):
@@ -108,5 +113,4 @@ def test_a_kind_beyond_the_last_is_refused(path: Path) -> None:
     """The declared range holds."""
     plant = Plant(path, 1.0)
     with pytest.raises(fmpy.FMICallException):
-        plant.inject(7, 1.0)
-        plant.advance()
+        plant.advance_under(7, 1.0)

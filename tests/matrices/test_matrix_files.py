@@ -8,13 +8,14 @@ from __future__ import annotations
 import subprocess
 from typing import TYPE_CHECKING
 
-import commands
 import h5py
 import numpy as np
 import pytest
-import record
 import scipy.io
 import scipy.signal
+
+import commands
+import record
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -136,10 +137,11 @@ WRONG = [
 ]
 
 
-@pytest.mark.parametrize(("model", "line", "words"), WRONG)
+@pytest.mark.parametrize("wrong", WRONG)
 @pytest.mark.parametrize(("save", "name"), [(savemat, "plant.mat"), (savez, "plant.npz")])
-def test_wrong_files(save: Callable, name: str, model: dict, line: str, words: list[str], tmp_path: Path) -> None:
+def test_wrong_files(save: Callable, name: str, wrong: tuple[dict, str, list[str]], tmp_path: Path) -> None:
     """One sentence names the file or the variable, and what is there."""
+    model, line, words = wrong
     save(model, tmp_path / name)
     refused(f'[[mode]]\nfile = "{name}"\n{line}', words, tmp_path)
 

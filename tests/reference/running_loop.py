@@ -126,21 +126,33 @@ def channels(design: dict, index: int, lost: dict | None = None, *, exact: bool 
     reading = (numbers(np.eye(p)) - silent) @ y + silent @ (C @ estimate)
     u = K @ estimate + G @ Z + (V @ acting if late else 0)
     used = acting if late else u
-    following = np.vstack([
-        A @ x + B @ used + E @ w,
-        u if late else whole[:0],
-        R @ Z - J @ reading[tracked],
-        A @ estimate + B @ used,
-        L @ (y - C @ estimate) if len(injection) else whole[:0],
-    ])
+    following = np.vstack(
+        [
+            A @ x + B @ used + E @ w,
+            u if late else whole[:0],
+            R @ Z - J @ reading[tracked],
+            A @ estimate + B @ used,
+            L @ (y - C @ estimate) if len(injection) else whole[:0],
+        ]
+    )
     spec = design["synthesis"]["state_feedback"]["spec"]
-    weight = np.concatenate([spec["integral_weight"], *[np.repeat(spec["integral_weight"], 2)] * len(feedback["resonators"])])
+    weight = np.concatenate(
+        [spec["integral_weight"], *[np.repeat(spec["integral_weight"], 2)] * len(feedback["resonators"])]
+    )
     seen = (C @ x)[tracked]
-    z = np.vstack([numbers(np.diag(spec["output_weight"])) @ seen, numbers(np.diag(weight)) @ Z, numbers(np.diag(spec["input_weight"])) @ u])
+    z = np.vstack(
+        [
+            numbers(np.diag(spec["output_weight"])) @ seen,
+            numbers(np.diag(weight)) @ Z,
+            numbers(np.diag(spec["input_weight"])) @ u,
+        ]
+    )
     N, s = sum(sizes), E.shape[1]
 
     def system(output: np.ndarray, first: int, last: int) -> System:
-        return System(following[:, :N], following[:, N + first : N + last], output[:, :N], output[:, N + first : N + last])
+        return System(
+            following[:, :N], following[:, N + first : N + last], output[:, :N], output[:, N + first : N + last]
+        )
 
     return Channels(system(z, 0, s), system(seen, s, s + p), system(u, s, s + p))
 
@@ -149,7 +161,8 @@ def observable(A: np.ndarray, C: np.ndarray) -> bool:
     """Whether the rows of C show the whole state (Hautus' test)."""
     n = len(A)
     return all(
-        np.linalg.svd(np.vstack([pole * np.eye(n) - A, C]), compute_uv=False)[n - 1] > 1e-8 for pole in np.linalg.eigvals(A)
+        np.linalg.svd(np.vstack([pole * np.eye(n) - A, C]), compute_uv=False)[n - 1] > 1e-8
+        for pole in np.linalg.eigvals(A)
     )
 
 

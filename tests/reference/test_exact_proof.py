@@ -1,4 +1,4 @@
-"""Claims proved once more in rational arithmetic: the loop formed of the very doubles that ship, pivots without rounding.
+"""Claims proved once more in rational arithmetic: the loop formed of the doubles that ship, pivots without rounding.
 
 promise: running-loop
 """
@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import math
 from fractions import Fraction
-from typing import TYPE_CHECKING
 
 import numpy as np
 import pytest
@@ -16,9 +15,6 @@ from scipy.linalg import solve_discrete_are, solve_discrete_lyapunov
 import commands
 import record
 from running_loop import System, channels, rationals
-
-if TYPE_CHECKING:
-    from pathlib import Path
 
 EXAMPLES = ["paper", "paper_output", "paper_latency", "tank", "converter"]
 
@@ -96,7 +92,9 @@ def error_maps(design: dict, lost: dict, exact: bool) -> list[np.ndarray]:  # no
     """Returns A - A H C of every mode for a set of lost sensors."""
     numbers = rationals if exact else np.array
     modes = design["plant"]["modes"]
-    parts = [(numbers(mode["a"]), numbers(H), numbers(mode["c"])) for mode, H in zip(modes, lost["correction"], strict=True)]
+    parts = [
+        (numbers(mode["a"]), numbers(H), numbers(mode["c"])) for mode, H in zip(modes, lost["correction"], strict=True)
+    ]
     return [A - A @ H @ C for A, H, C in parts]
 
 

@@ -31,7 +31,7 @@
 //!     estimator: Estimator {
 //!         method: EstimatorMethod::None, response_length: 0, window: 0, predictors: vec![], adapt: false,
 //!         harmonics: None, harmonic_transfers: vec![], thresholds: vec![1.0], debounce: 1, stuck_after: 0,
-//!         leverage_limit: 100.0, largest_fault: vec![10.0],
+//!         leverage_limit: 100.0, largest_fault: vec![10.0], hypotheses: None,
 //!     },
 //!     compensation: Compensation::None,
 //!     input_limits: vec![Limits::default()],

@@ -68,7 +68,8 @@ impl fmt::Display for Error {
 }
 
 /// The tables and values of a design file.
-const TOP: [&str; 11] = [
+const TOP: [&str; 12] = [
+    "continuous",
     "name",
     "sample_time",
     "mode",
