@@ -4,6 +4,7 @@
 
 mod plants;
 
+use ftc_control::parameters::ObserverKind;
 use ftc_design::certificate::{CertificateError, Enclosure};
 use ftc_design::{
     ControlSpec, Lyapunov, ObserverChoice, ObserverSpec, StateFeedback, Synthesis, synthesise,
@@ -126,7 +127,14 @@ fn a_dwell_time_that_is_too_short_is_refused() {
 fn a_damaged_observer_is_refused() {
     for (plant, synthesis) in all() {
         let mut gain = synthesis.observer.clone();
-        gain.observer.gains[0] = gain.observer.gains[0].clone().scaled(5.0);
+        // A filter in correction form has no other gain.
+        match gain.observer.kind {
+            ObserverKind::Kalman => {
+                let correction = &mut gain.observer.decoupling[0][0];
+                *correction = correction.clone().scaled(5.0);
+            }
+            _ => gain.observer.gains[0] = gain.observer.gains[0].clone().scaled(5.0),
+        }
         gain.verify(&plant).unwrap_err();
         let mut decay = synthesis.observer.clone();
         decay.spec.decay = 1e-12;

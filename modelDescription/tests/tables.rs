@@ -93,7 +93,8 @@ fn names_are_the_contract() {
     };
     let design = sized([1, 2, 2, 1, 1, 2]);
     let expected = "y[1] y[2] y_ref[1] mode mode_real u[1] u[2] x_hat[1] f_hat[1] f_hat[2] \
-                    residual[1] residual[2] fault[1] fault[2] fault_real[1] fault_real[2] ftc_enabled threshold[1] threshold[2]";
+                    residual[1] residual[2] fault[1] fault[2] fault_real[1] fault_real[2] ftc_enabled threshold[1] threshold[2] \
+                    suspect[1] suspect[2] model_valid load_hat[1] load_hat[2] actuator_fault[1] actuator_fault[2]";
     assert_eq!(names(controller(&design)).join(" "), expected);
     let expected = "u[1] u[2] f_ext[1] f_ext[2] w_ext[1] mode_ext mode_ext_real y[1] y[2] \
                     y_true[1] y_true[2] x[1] y_ref[1] mode mode_real f[1] f[2] w[1] \

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 
 import fmpy
 import pytest
+from fmpy.fmi1 import FMICallException
 from fmpy.fmi2 import FMU2Slave
 
 import commands
@@ -40,6 +41,7 @@ class Plant:
         self.fmu.setupExperiment(startTime=0.0)
         self.fmu.enterInitializationMode()
         self.fmu.setBoolean([self.reference["scenario_enabled"], self.reference["noise_enabled"]], [False, False])
+        self.fmu.setInteger([self.reference["mode_ext"]], [1])
         self.fmu.exitInitializationMode()
 
     def inject(self, kind: int, size: float) -> None:
@@ -112,5 +114,5 @@ def test_a_fault_is_injected_at_run_time(path: Path, kind: int) -> None:
 def test_a_kind_beyond_the_last_is_refused(path: Path) -> None:
     """The declared range holds."""
     plant = Plant(path, 1.0)
-    with pytest.raises(fmpy.FMICallException):
+    with pytest.raises(FMICallException):
         plant.advance_under(7, 1.0)

@@ -62,8 +62,8 @@ def test_the_delay_is_harmless_where_it_was_designed_for(example_case: Callable[
     assert np.all(ours < 0.1 * native["y_ref"].var(axis=0))
 
 
-def test_the_delay_is_fatal_where_it_was_not(example_case: Callable[[str], Case]) -> None:
-    """The design without delay, stepped in parallel, does worse than no control: its proof was of another loop."""
+def test_a_delay_that_was_not_designed_for_costs(example_case: Callable[[str], Case]) -> None:
+    """The design without delay, stepped in parallel, does worse than it was designed to."""
     case = example_case("paper")
     loop = masters.run_fmpy(case.fmus, case.run.trajectories.ticks, masters.Schedule(parallel=True))
     native = case.run.trajectories
@@ -71,6 +71,6 @@ def test_the_delay_is_fatal_where_it_was_not(example_case: Callable[[str], Case]
     def error(y_true: np.ndarray) -> np.ndarray:
         return ((native["y_ref"] - y_true) ** 2).mean(axis=0)
 
-    nothing_done = error(np.zeros_like(native["y_ref"]))
-    assert np.all(error(loop["y_true"]) > nothing_done)
-    assert np.all(error(native["ftc.y_true"]) < 0.1 * nothing_done)
+    designed_for = error(native["ftc.y_true"])
+    assert np.all(error(loop["y_true"]) > designed_for)
+    assert np.all(designed_for < 0.1 * error(np.zeros_like(native["y_ref"])))

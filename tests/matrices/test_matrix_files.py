@@ -34,7 +34,7 @@ def designed(text: str, folder: Path) -> dict[str, np.ndarray]:
     """Exports a design and returns the matrices of its first mode."""
     path = folder / "design.toml"
     path.write_text(TOP + text + REST)
-    mode = record.load(commands.export(path, folder).controller)["controller"]["plant"]["modes"][0]
+    mode = record.load(commands.export(path, folder).controller)["plant"]["modes"][0]
     return {name: np.array(mode[name.lower()]) for name in MODEL}
 
 

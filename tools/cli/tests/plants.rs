@@ -59,7 +59,7 @@ fn continuous_matrices_are_sampled_exactly() {
         let (code, out, error) = run(text, &["design", FILE, "--json"]);
         assert_eq!(code, 0, "{error}");
         let report: serde_json::Value = serde_json::from_str(&out).unwrap();
-        report["state_feedback"]["modes"][0]["gamma"]
+        report["gamma"][0]
             .as_f64()
             .unwrap()
     };

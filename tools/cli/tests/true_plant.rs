@@ -121,7 +121,7 @@ fn a_wrong_true_plant_is_refused_by_key() {
         ),
         (
             "mode = [{ A = [[1.0]] }]",
-            vec!["scenario.plant", "A is 1 x 1"],
+            vec!["scenario.plant", "A of 1 x 1"],
         ),
         (
             "told = [{ from = 0, mode = 2 }]",

@@ -281,7 +281,7 @@ fn a_careful_forger_is_found_out() {
             design["controller"]["feedback"][key] = value.clone();
         });
         changed.seal();
-        changed.refused(case, 1, &[case, "not what was proved"]);
+        changed.refused(case, 1, &[case, "does not follow from what is proved"]);
     }
 
     let mut observer = Exported::new(SOUND);

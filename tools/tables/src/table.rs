@@ -275,7 +275,8 @@ fn said_delimiter(head: &[u8]) -> (Option<u8>, usize) {
 }
 
 /// The delimiter that gives the most columns, among those under which the first row below the
-/// header has a cell for each.
+/// header has a cell for each and there is more than one column; where there is none, the one with
+/// the most columns.
 fn likely_delimiter(head: &[u8]) -> u8 {
     let columns = |delimiter: &u8| {
         let mut reader = ReaderBuilder::new()
@@ -285,7 +286,7 @@ fn likely_delimiter(head: &[u8]) -> u8 {
         let header = reader.byte_headers().map_or(0, csv::ByteRecord::len);
         let first = reader.byte_records().next();
         let first = first.and_then(Result::ok).map_or(header, |row| row.len());
-        (first == header, header)
+        (first == header && header > 1, header)
     };
     let best = DELIMITERS.iter().rev().max_by_key(|one| columns(one));
     best.copied().unwrap_or(b',')

@@ -4,9 +4,19 @@ use super::{DEEPEST, Found, check_shape, from_columns};
 use matrw::{MatVariable, MatlabType, load_matfile_from_u8};
 use nalgebra::DMatrix;
 
+/// How the text at the head of the file begins where MATLAB wrote it; SciPy leaves the comma out, and the
+/// reader wants it. The text says who wrote the file and when, and nothing else.
+const HEAD: &[u8] = b"MATLAB 5.0 MAT-file, ";
+
 pub(super) fn read(bytes: &[u8]) -> Result<Found, String> {
-    let file = load_matfile_from_u8(bytes).map_err(|error| {
-        format!("cannot be read as a MATLAB file ({error}): save it again, plain arrays or a structure of them")
+    let mut bytes = bytes.to_vec();
+    if let Some(head) = bytes.get_mut(..HEAD.len()) {
+        head.copy_from_slice(HEAD);
+    }
+    let file = load_matfile_from_u8(&bytes).map_err(|error| {
+        let what = error.to_string();
+        let what = what.lines().next().unwrap_or_default().trim();
+        format!("cannot be read as a MATLAB file ({what}): save it again, plain arrays or a structure of them")
     })?;
     let mut found = Found::new();
     for (name, variable) in file.iter() {
