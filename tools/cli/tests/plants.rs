@@ -59,9 +59,7 @@ fn continuous_matrices_are_sampled_exactly() {
         let (code, out, error) = run(text, &["design", FILE, "--json"]);
         assert_eq!(code, 0, "{error}");
         let report: serde_json::Value = serde_json::from_str(&out).unwrap();
-        report["gamma"][0]
-            .as_f64()
-            .unwrap()
+        report["gamma"][0].as_f64().unwrap()
     };
     let (given, found) = (gamma(&sampled), gamma(CONTINUOUS));
     assert!((given / found - 1.0).abs() < 1e-6, "{given} {found}");

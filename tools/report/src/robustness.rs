@@ -214,14 +214,14 @@ pub fn text(design: &Design, cases: &[Case]) -> String {
 }
 
 /// The same for a program.
-pub fn json(cases: &[Case]) -> Value {
+pub fn json(cases: &[Case], warnings: &[String]) -> Value {
     let finite = |values: &[f64]| -> Vec<Option<f64>> {
         let finite = values
             .iter()
             .map(|&value| Some(value).filter(|v| v.is_finite()));
         finite.collect()
     };
-    cases
+    let cases: Value = cases
         .iter()
         .map(|case| {
             json!({
@@ -229,7 +229,8 @@ pub fn json(cases: &[Case]) -> Value {
                 "mse": { "ftc": finite(&case.with), "no_ftc": finite(&case.without) },
             })
         })
-        .collect()
+        .collect();
+    json!({ "cases": cases, "warnings": warnings })
 }
 
 #[cfg(test)]

@@ -45,8 +45,9 @@ pub fn simulate(
     let csv = table(design, &trajectories).map_err(|error| error.to_string())?;
     let metrics = metrics(design, &trajectories, bound.as_deref(), &warnings);
     let cases = robustness::cases(design);
-    warnings.extend(robustness::warnings(design, &cases));
-    let tried = format!("{:#}\n", robustness::json(&cases));
+    let worse = robustness::warnings(design, &cases);
+    let tried = format!("{:#}\n", robustness::json(&cases, &worse));
+    warnings.extend(worse);
     let mut files = vec![
         ("trajectories.csv".to_string(), csv),
         ("metrics.json".to_string(), metrics.into_bytes()),

@@ -204,7 +204,7 @@ fn main() {
     };
     let scaling = Scaling::automatic(&plant);
     // The structured solver needs no BLAS; the general one does.
-    let run = Run { solver: Solver::Clarabel, ..Run::default() };
+    let run = Run { solver: Solver::General, ..Run::default() };
     let control = state_feedback::synthesise_with(&plant, &spec, &scaling, &run).expect("the plant is easy");
     control.verify(&plant).expect("it is proved");
     let calls = CALLS.load(Ordering::Relaxed);
