@@ -98,7 +98,8 @@ fn names_are_the_contract() {
     assert_eq!(names(controller(&design)).join(" "), expected);
     let expected = "u[1] u[2] f_ext[1] f_ext[2] w_ext[1] mode_ext mode_ext_real y[1] y[2] \
                     y_true[1] y_true[2] x[1] y_ref[1] mode mode_real f[1] f[2] w[1] \
-                    scenario_enabled noise_enabled";
+                    scenario_enabled noise_enabled inject_kind[1] inject_kind[2] inject_size[1] inject_size[2] \
+                    inject_from[1] inject_from[2] inject_until[1] inject_until[2]";
     assert_eq!(names(plant(&design)).join(" "), expected);
 }
 

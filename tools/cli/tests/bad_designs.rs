@@ -886,7 +886,7 @@ fn tables_from_csv() {
             &["'oops'", "row 2"],
         ),
         ("not finite", b"t,level\n0,nan\n", &["'nan'", "row 1"]),
-        ("ragged", b"t,level\n0,1,2\n", &["damaged"]),
+        ("ragged", b"t,level\n0,1,2\n", &["line 2", "3 cells"]),
         ("not text", b"t,level\n0,\xff\xfe\n", &["t.csv"]),
     ];
     for (case, table, words) in cases {
