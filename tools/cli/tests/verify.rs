@@ -325,7 +325,7 @@ fn a_careful_forger_is_found_out() {
         }
     });
     gamma.seal();
-    gamma.refused("gamma lowered", 1, &["attenuation", "could not be proved"]);
+    gamma.refused("gamma lowered", 1, &["gamma", "proved"]);
 }
 
 #[test]
