@@ -129,7 +129,7 @@ def test_integers_and_single_precision(tmp_path: Path) -> None:
 WRONG = [
     ({"A": A, "B": B}, "", ["C is missing", "A, B"]),
     ({"X": A, "B": B, "C": C}, "", ["A is missing", "B, C, X"]),
-    ({**MODEL, "A": A + 1j}, "", ["A", "complex"]),
+    ({**MODEL, "A": A + 1j}, "", ["A", "save real"]),
     ({**MODEL, "A": np.zeros((2, 3, 3))}, "", ["A has 3 dimensions"]),
     ({**MODEL, "A": A * np.nan}, "", ["plant", "A: the entry in row 1, column 1"]),
     (MODEL, 'A = "Z"\n', ["no variable 'Z'", "A, B, C, E"]),

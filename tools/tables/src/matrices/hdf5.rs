@@ -8,6 +8,11 @@ use nalgebra::DMatrix;
 const INTERNAL: char = '#';
 
 pub(super) fn read(bytes: Vec<u8>) -> Result<Found, String> {
+    if end_of_file(&bytes).is_some_and(|end| end > bytes.len() as u64) {
+        return Err(
+            "is cut short, a MATLAB 7.3 file without its end: copy or save it again".into(),
+        );
+    }
     let mut found = Found::new();
     File::from_bytes(bytes)
         .and_then(|file| add(&mut found, "", &file.root(), DEEPEST))
@@ -61,4 +66,24 @@ fn dense(dataset: &Dataset) -> Result<DMatrix<f64>, String> {
     shape.reverse();
     check_shape(&shape)?;
     from_columns(&shape, &dataset.read_f64().map_err(blame)?)
+}
+
+/// Where the file says that it ends: the address of HDF5's superblock, versions 0 to 3, with addresses of
+/// eight bytes. The superblock stands at 0, 512, 1024 and so on.
+fn end_of_file(bytes: &[u8]) -> Option<u64> {
+    let places = core::iter::once(0).chain((9..).map(|power| 1 << power));
+    let block = places
+        .map_while(|place: usize| bytes.get(place..))
+        .find(|block| block.starts_with(b"\x89HDF\r\n\x1a\n"))?;
+    let (width, address) = match block.get(8)? {
+        0 => (13, 40),
+        1 => (13, 44),
+        2 | 3 => (9, 28),
+        _ => return None,
+    };
+    if *block.get(width)? != 8 {
+        return None;
+    }
+    let address = block.get(address..address + 8)?.try_into().ok()?;
+    Some(u64::from_le_bytes(address))
 }
