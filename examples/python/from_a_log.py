@@ -65,6 +65,7 @@ def main() -> None:
         output_weight=0.2,
         integral_weight=0.05,
         input_weight=0.1,
+        disturbance=WATER,
         estimator={"database": healthy, "response_length": 20, "debounce": 1},
     )
     print(design)

@@ -23,8 +23,8 @@ for program in cargo rustc; do
     fi
 done
 
-python -m pytest -c tools/python/pytest.ini --rootdir tools/python
-python tools/python/readme.py README.md "$folder/readme"
+python -m pytest -c tools/python/pytest.ini --rootdir tools/python tools/python/tests
+python -P tools/python/readme.py README.md "$folder/readme"
 for example in quadruple_tank dc_motor boost_converter; do
     python "examples/python/$example.py" --out "$folder/$example" --runs 100
 done

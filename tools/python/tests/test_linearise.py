@@ -164,6 +164,6 @@ def test_a_co_simulation_fmu_must_show_its_state(rectifier: tuple[ftc.Design, Pa
     with pytest.raises(ftc.DesignFileError, match="give states="):
         ftc.Plant.from_fmu(fmu, ["u[1]"], ["y_true[1]"], sample_time=design.sample_time)
     arguments = {"sample_time": design.sample_time, "states": ["x[1]", "x[2]", "x[3]"]}
-    point = {"scenario_enabled": False, "noise_enabled": False, "u[1]": 30.0}
+    point = {"scenario_enabled": False, "noise_enabled": False, "mode_ext": 1, "u[1]": 30.0}
     with pytest.raises(ftc.DesignFileError, match="not at rest"):
         ftc.Plant.from_fmu(fmu, ["u[1]", "u[2]"], ["y_true[1]"], [point], **arguments)
