@@ -152,7 +152,9 @@ plant = ftc.Plant(modes, 1.0)
 
 def test_ctrl_c_ends_the_wait() -> None:
     """Within a second or two, by KeyboardInterrupt."""
+    # A shell without job control starts what runs in the background with the signal ignored.
     code = SLOW + (
+        "import signal\nsignal.signal(signal.SIGINT, signal.default_int_handler)\n"
         "def told(what, seconds):\n    print(what, flush=True)\n"
         "try:\n    ftc.design(plant, decay=0.97, estimator={'method': 'none'}, progress=told)\n    print('done')\n"
         "except KeyboardInterrupt:\n    print('interrupted', flush=True)\n"
