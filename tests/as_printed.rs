@@ -46,7 +46,7 @@ fn no_plant_satisfies_them() {
             )],
         };
         assert!(!theorem_1(&plant).unwrap().feasible);
-        let spec = ControlSpec::new(plant.dimensions());
+        let spec = ControlSpec::unweighted(plant.dimensions());
         assert!(!theorem_2(&plant, &spec).unwrap().feasible);
     }
 }

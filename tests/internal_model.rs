@@ -42,7 +42,7 @@ fn spec(latency: usize, lyapunov: Lyapunov, decay: f64, harmonics: usize) -> Con
         resonators: disturbance(harmonics).angles(1.0),
         integral_weight: vec![0.3; 2],
         input_weight: vec![0.1; 2],
-        ..ControlSpec::new(plant(Channel::State).dimensions())
+        ..ControlSpec::unweighted(plant(Channel::State).dimensions())
     }
 }
 
@@ -248,7 +248,7 @@ fn a_harmonic_the_inputs_cannot_reach_is_named() {
     };
     let control = ControlSpec {
         resonators: vec![1.0, ANGLE],
-        ..ControlSpec::new(blind.dimensions())
+        ..ControlSpec::unweighted(blind.dimensions())
     };
     let error = check_controllable(&blind, &control, &Scaling::unit(3, 1, 1)).unwrap_err();
     assert!(error.contains("harmonic 2"), "{error}");

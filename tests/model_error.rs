@@ -62,7 +62,7 @@ fn design(model: &SwitchedPlant, truth: &SwitchedPlant, noise: f64) -> Design {
         decay: 0.7,
         integral_weight: vec![0.3; 2],
         input_weight: vec![0.1; 2],
-        ..ControlSpec::new(dims)
+        ..ControlSpec::unweighted(dims)
     };
     let observer = ObserverSpec {
         kind: ObserverChoice::Auto,

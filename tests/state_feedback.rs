@@ -17,7 +17,7 @@ use plants::{
     sparsely_disturbed, spread_units, three_modes, two_channels, usual_spec,
 };
 
-/// Half a unit of the fourth decimal, to which the reference values are given, plus the hair that
+/// Half a unit of the fourth decimal, to which the reference values are given, plus the relaxation that
 /// is given up for a margin.
 fn assert_agrees(found: f64, reference: f64) {
     let tolerance = 0.5e-4 + 2e-5 * reference;
@@ -202,7 +202,7 @@ fn the_rectifier_in_si_units_meets_its_decay() {
             output_weight: vec![1.0 / 600.0, 1.0 / 30.0],
             integral_weight: vec![10.0 / 600.0, 10.0 / 30.0],
             input_weight: vec![0.1; 2],
-            ..ControlSpec::new(plant.dimensions())
+            ..ControlSpec::unweighted(plant.dimensions())
         };
         let design = synthesise(&plant, &spec, &Scaling::automatic(&plant)).unwrap();
         design.verify(&plant).unwrap();
@@ -228,7 +228,7 @@ fn random_plants_are_designed_certified_and_do_what_was_promised() {
                 latency: seed as usize / 3 % 2,
                 integral_weight: vec![0.3; r],
                 input_weight: vec![0.1; dims.inputs],
-                ..ControlSpec::new(dims)
+                ..ControlSpec::unweighted(dims)
             };
             let design = match synthesise(&plant, &spec, &Scaling::automatic(&plant)) {
                 Ok(design) => design,
@@ -331,7 +331,7 @@ fn usual(plant: &SwitchedPlant, lyapunov: Lyapunov, decay: f64) -> ControlSpec {
         output_weight: vec![1.0; r],
         integral_weight: vec![0.3; r],
         input_weight: vec![0.1; dims.inputs],
-        ..ControlSpec::new(dims)
+        ..ControlSpec::unweighted(dims)
     }
 }
 

@@ -54,7 +54,7 @@ fn timed(plant: &SwitchedPlant, lyapunov: Lyapunov) -> (f64, &'static str) {
         output_weight: vec![1.0; tracked],
         integral_weight: vec![0.3; tracked],
         input_weight: vec![0.3; dims.inputs],
-        ..ControlSpec::new(dims)
+        ..ControlSpec::unweighted(dims)
     };
     let observer = ObserverSpec {
         kind: ObserverChoice::Auto,

@@ -74,7 +74,7 @@ pub fn paper_spec(latency: usize, decay: f64, lyapunov: Lyapunov) -> ControlSpec
         output_weight: vec![1.0; 2],
         integral_weight: vec![0.3; 2],
         input_weight: vec![0.1; 2],
-        ..ControlSpec::new(dims)
+        ..ControlSpec::unweighted(dims)
     }
 }
 
@@ -404,7 +404,7 @@ pub fn usual_spec(seed: u64, dims: Dimensions) -> ControlSpec {
         lyapunov: [Lyapunov::Common, Lyapunov::Switched, Lyapunov::Dwell][seed as usize % 3],
         integral_weight: vec![0.3; r],
         input_weight: vec![0.1; dims.inputs],
-        ..ControlSpec::new(dims)
+        ..ControlSpec::unweighted(dims)
     }
 }
 

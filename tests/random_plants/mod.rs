@@ -89,7 +89,7 @@ pub fn design_with(dice: &mut Dice, method: EstimatorMethod) -> Design {
             output_weight: vec![1.0; r],
             integral_weight: vec![0.3 / plant.sample_time; r],
             input_weight: vec![0.3; m],
-            ..ControlSpec::new(dims)
+            ..ControlSpec::unweighted(dims)
         };
         let period = dice.between(40.0, 300.0) * plant.sample_time;
         let scenario = Scenario {

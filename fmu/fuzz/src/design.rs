@@ -1,4 +1,4 @@
-//! Designs that somebody forged: numbers exchanged, text damaged, the guid made to fit.
+//! Forged designs: numbers exchanged, text damaged, the guid made to fit.
 
 use fmu_abi::{Slave, Values};
 use fmu_host::model::example;

@@ -1,4 +1,4 @@
-//! Saved states of the controller that somebody forged: edited bytes under a checksum that holds.
+//! Forged saved states of the controller: edited bytes under a checksum that holds.
 //!
 //! promise: hostile-calls
 

@@ -235,8 +235,8 @@ impl Controller {
         }
     }
 
-    /// Before a tick: its readings are held ones, since nobody read the sensors anew; that they
-    /// repeat accuses nobody.
+    /// Before a tick: marks its readings as held, the sensors were not sampled again; their repetition
+    /// is then no sign of a frozen sensor.
     pub fn hold_readings(&self, state: &mut ControllerState) {
         state.repetition.hold();
     }
@@ -473,7 +473,7 @@ impl Controller {
     }
 }
 
-/// What the sensors say (p): who believes them, or knows their fault, believes a frozen one too.
+/// The readings used (p): frozen ones are screened only where faults are estimated.
 fn readings<'a>(repetition: &'a Repetition, sample: &Sample<'a>) -> &'a [f64] {
     match sample.compensate {
         Compensate::Estimate => repetition.screened(),

@@ -1,10 +1,10 @@
-//! What the model alone says since residuals lost their meaning, and whom it contradicts.
+//! The model run in open loop while residuals cannot be used, and the sensors it contradicts.
 //!
-//! While the regressor mixes modes, or lies beyond what the database spans, no residual means
-//! anything, and an accused sensor is corrected by the last estimate of its fault. That is right for
+//! While the regressor mixes modes, or lies beyond what the database spans, no residual can be
+//! used, and an accused sensor is corrected by the last estimate of its fault. That is right for
 //! a bias. A sensor that is stuck, or whose fault comes or goes just then, would leave the loop
 //! without feedback: where the corrected reading and the model's run since then drift far apart, the
-//! model is believed.
+//! model's output replaces the reading.
 
 use super::kernel;
 use super::observer::ObservedMode;
@@ -43,7 +43,7 @@ impl OpenLoop {
         }
     }
 
-    /// While nobody leans on it: starts anew from the observer's prediction of the next state (n).
+    /// While it is not in use: starts anew from the observer's prediction of the next state (n).
     pub fn restart(&mut self, predicted: &[f64]) {
         kernel::copy(&mut self.state, predicted);
         self.contradicted.fill(false);

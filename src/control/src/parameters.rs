@@ -180,7 +180,7 @@ pub struct Estimator {
     /// Sizes and rates for [`EstimatorMethod::Observer`].
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub hypotheses: Option<Hypotheses>,
-    /// `j`: how many past inputs the output remembers.
+    /// `j`: how many past inputs the output depends on.
     pub response_length: usize,
     /// `L`: samples in the window of [`EstimatorMethod::Sliding`], more than `m j`.
     pub window: usize,

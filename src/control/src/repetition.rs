@@ -65,7 +65,7 @@ impl Repetition {
         &self.screened
     }
 
-    /// Says that the coming readings are the last ones, held because nobody read the sensors anew.
+    /// Marks the coming readings as held: the sensors were not sampled again.
     pub fn hold(&mut self) {
         self.held = true;
     }

@@ -23,7 +23,7 @@ pub struct PrintedVerdict {
     pub feasible: bool,
     /// The largest `t` for which every inequality holds with `>= t I` and `trace Q = n`.
     pub margin: f64,
-    /// Who holds the margin down, the heaviest first.
+    /// The inequalities that limit the margin, the largest share first.
     pub blocks: Vec<ConflictingBlock>,
     /// Why it cannot be otherwise.
     pub reason: &'static str,

@@ -43,6 +43,28 @@ pub struct Request {
     pub scenario: Scenario,
 }
 
+impl Request {
+    /// A request in which all but plant, signals and experiment has its default. The reference acts on the
+    /// command at once, a mode switch is not bumpless, an estimated fault is taken out by a virtual
+    /// sensor; for the rest see [`ControlSpec::new`], [`ObserverSpec::beside`] and [`EstimatorSpec`].
+    pub fn new(name: &str, plant: SwitchedPlant, signals: Signals, scenario: Scenario) -> Self {
+        let control = ControlSpec::new(&signals.scaling());
+        Self {
+            name: name.into(),
+            signals,
+            plant,
+            true_plant: TruePlant::default(),
+            bumpless: false,
+            feedforward: true,
+            observer: ObserverSpec::beside(&control),
+            control,
+            estimator: EstimatorSpec::default(),
+            compensation: Compensation::VirtualSensor,
+            scenario,
+        }
+    }
+}
+
 /// The fault estimator that is asked for.
 #[derive(Clone, Debug, PartialEq)]
 pub struct EstimatorSpec {
@@ -64,6 +86,22 @@ pub struct EstimatorSpec {
     pub disturbance: Option<KnownDisturbance>,
     /// What is asked of the state-based method.
     pub hypotheses: HypothesesSpec,
+}
+
+impl Default for EstimatorSpec {
+    fn default() -> Self {
+        Self {
+            method: EstimatorMethod::Reference,
+            response_length: None,
+            database: DatabaseSource::Commission,
+            threshold: Threshold::Sigmas(6.0),
+            debounce: 1,
+            stuck_after: 0,
+            adapt: false,
+            disturbance: None,
+            hypotheses: HypothesesSpec::default(),
+        }
+    }
 }
 
 /// Where the healthy database comes from.
@@ -94,9 +132,9 @@ const SMALLEST_THRESHOLD: f64 = 1e-3;
 pub(crate) const LEVERAGE_LIMIT: f64 = 100.0;
 
 /// A threshold opens by so much more than the largest known response to the disturbance before that
-/// is learned. While least squares learns, what is left of any such response stays below `1 / ROOM` of
+/// is learned. While least squares learns, what is left of any such response stays below `1 / OPENING_FACTOR` of
 /// that opening (Cauchy-Schwarz), hence below the half from which the estimator learns.
-const ROOM: f64 = 2.5;
+const OPENING_FACTOR: f64 = 2.5;
 
 /// Variance of a harmonic of which nothing is known, in units of the noise variance.
 const UNKNOWN_VARIANCE: f64 = 1e6;
@@ -130,7 +168,7 @@ pub fn assemble(request: Request) -> Result<Design, DesignError> {
     Ok(assemble_with(request, &Run::default())?)
 }
 
-/// [`assemble`] with a chosen solver and someone who watches.
+/// [`assemble`] with a chosen solver, its progress reported.
 ///
 /// # Errors
 /// As [`assemble`], with the part that was found.
@@ -403,7 +441,7 @@ fn thresholds(
     }
 }
 
-/// What the estimator is told of the disturbance. A known amplitude bounds its response, so that
+/// The disturbance as the estimator knows it. A known amplitude bounds its response, so that
 /// the thresholds need not be opened wider than that response while it is being learned.
 fn known_harmonics(
     known: &KnownDisturbance,
@@ -414,7 +452,7 @@ fn known_harmonics(
     let variance = known.amplitude.as_ref().map(|amplitude| {
         let response = harmonics::largest_response(plant, period, known.harmonics, amplitude);
         let openings = response.iter().zip(thresholds).map(|(r, t)| r / t);
-        (ROOM * openings.fold(0.0, f64::max)).powi(2)
+        (OPENING_FACTOR * openings.fold(0.0, f64::max)).powi(2)
     });
     Harmonics {
         period,

@@ -25,8 +25,8 @@ use serde::{Deserialize, Serialize};
 
 /// A Lyapunov matrix `S = L M L'` of the function `x' S^-1 x`, in the certificate's units.
 ///
-/// `L` carries the bad conditioning, so that the proof, stated in the coordinates `L^-1 x`, does not
-/// drown in rounding.
+/// `L` takes up the bad conditioning, so that the proof, stated in the coordinates `L^-1 x`, is not
+/// spoiled by rounding.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct FactoredLyapunov {
     /// `L` (d x d), regular.

@@ -1,9 +1,9 @@
-//! How a periodic disturbance that was heard in one mode sounds in another.
+//! The response to a periodic disturbance, mapped from one mode to another.
 //!
 //! At angle `theta` per sample the disturbance reaches the output through
 //! `G_i = C_i (e^{j theta} I - A_i)^-1 E_i + F_i`, so phasors learned in mode `i` become
-//! `G_j G_i^+` times themselves in mode `j`. That is exact where the model is, and a far better
-//! start than silence where it nearly is.
+//! `G_j G_i^+` times themselves in mode `j`. That is exact where the model is, and a better
+//! initial value than zero where the model is approximate.
 
 use super::matrices::plain;
 use core::f64::consts::TAU;

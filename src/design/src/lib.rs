@@ -19,8 +19,9 @@
 //!     operating_point: OperatingPoint::zero(2, 1, 1),
 //! };
 //! let plant = SwitchedPlant { sample_time: 1.0, modes: vec![mode(0.9), mode(0.8)] };
-//! let spec = ControlSpec { decay: 0.98, ..ControlSpec::new(plant.dimensions()) };
-//! let control = state_feedback::synthesise(&plant, &spec, &Scaling::automatic(&plant))?;
+//! let scaling = Scaling::automatic(&plant);
+//! let spec = ControlSpec { decay: 0.98, ..ControlSpec::new(&scaling) };
+//! let control = state_feedback::synthesise(&plant, &spec, &scaling)?;
 //! control.verify(&plant)?; // from the very doubles, without the solver
 //! assert!(control.spectral_radius.iter().all(|&radius| radius < 0.98));
 //! # Ok::<(), ftc_design::DesignError>(())

@@ -1,4 +1,4 @@
-//! Which solver finds gains, and who is told how far it has come.
+//! Which solver finds gains, and how its progress is reported.
 
 use std::fmt;
 
@@ -57,7 +57,7 @@ impl fmt::Display for Step {
 pub struct Run<'a> {
     /// The solver.
     pub solver: Solver,
-    /// Is told of every step.
+    /// Called at every step.
     pub watch: &'a dyn Fn(Step),
 }
 

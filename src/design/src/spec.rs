@@ -3,6 +3,7 @@
 use super::Lyapunov;
 use core::f64::consts::{PI, TAU};
 use ftc_plant::Dimensions;
+use ftc_plant::scaling::Scaling;
 use serde::{Deserialize, Serialize};
 
 /// The state feedback that is asked for.
@@ -43,19 +44,43 @@ pub enum Objective {
 }
 
 impl ControlSpec {
-    /// Every output tracked as far as there are inputs, decay 1, weights 1 / 1 / 1.
-    pub fn new(dims: Dimensions) -> Self {
-        let r = dims.outputs.min(dims.inputs);
+    /// What is asked for where nothing else is: the first outputs are tracked, as many as there are
+    /// inputs, and [`ControlSpec::tracking`] gives the rest.
+    pub fn new(scaling: &Scaling) -> Self {
+        let r = scaling.outputs.len().min(scaling.inputs.len());
+        Self::tracking((0..r).collect(), scaling)
+    }
+
+    /// The defaults for these tracked outputs (from 0): decay 0.95, one Lyapunov function, least `gamma`, and
+    /// weights 1 (outputs), 0.3 (their integrals) and 0.1 (inputs) divided by the nominal values.
+    pub fn tracking(tracked: Vec<usize>, scaling: &Scaling) -> Self {
+        let weights = |weight: f64| {
+            let nominal = tracked.iter().map(|&output| scaling.outputs[output]);
+            nominal.map(|nominal| weight / nominal).collect()
+        };
         Self {
-            tracked: (0..r).collect(),
             latency: 0,
             lyapunov: Lyapunov::Common,
-            decay: 1.0,
+            decay: 0.95,
             objective: Objective::Attenuation,
             resonators: Vec::new(),
-            output_weight: vec![1.0; r],
+            output_weight: weights(1.0),
+            integral_weight: weights(0.3),
+            input_weight: scaling.inputs.iter().map(|nominal| 0.1 / nominal).collect(),
+            tracked,
+        }
+    }
+
+    /// Theorem T2 without weighing anything, to compare with other solvers: decay 1, every weight 1.
+    pub fn unweighted(dims: Dimensions) -> Self {
+        let scaling = Scaling::unit(dims.states, dims.inputs, dims.outputs);
+        let usual = Self::new(&scaling);
+        let r = usual.tracked.len();
+        Self {
+            decay: 1.0,
             integral_weight: vec![1.0; r],
             input_weight: vec![1.0; dims.inputs],
+            ..usual
         }
     }
 
@@ -192,6 +217,17 @@ pub struct ObserverSpec {
 }
 
 impl ObserverSpec {
+    /// The defaults beside a controller of this decay and guarantee: the kind that serves the loop best, a
+    /// decay as fast as the controller's.
+    pub fn beside(control: &ControlSpec) -> Self {
+        Self {
+            kind: ObserverChoice::Auto,
+            decay: control.decay,
+            lyapunov: control.lyapunov,
+            noise: Vec::new(),
+        }
+    }
+
     /// Says in one sentence what is wrong with the request.
     ///
     /// # Errors

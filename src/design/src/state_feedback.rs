@@ -6,8 +6,6 @@
 mod advice;
 #[cfg(feature = "solver")]
 mod direct;
-#[cfg(feature = "solver")]
-mod frame;
 mod proof;
 #[cfg(feature = "solver")]
 mod riccati;
@@ -17,6 +15,8 @@ mod structured;
 mod synthesis;
 #[cfg(feature = "solver")]
 mod theorem;
+#[cfg(feature = "solver")]
+mod transformation;
 
 #[cfg(feature = "solver")]
 pub use synthesis::{synthesise, synthesise_with};

@@ -70,7 +70,7 @@ pub fn synthesise(
     )?)
 }
 
-/// [`synthesise`] with a chosen solver and someone who watches. That there is no observer is said only
+/// [`synthesise`] with a chosen solver, its progress reported. That there is no observer is said only
 /// after another scaling has confirmed it.
 ///
 /// # Errors

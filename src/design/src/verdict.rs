@@ -119,7 +119,7 @@ impl fmt::Display for Advice {
 pub struct Infeasibility {
     /// The largest `t` for which every normalised inequality holds with `>= t I`; not positive.
     pub margin: f64,
-    /// Who holds the margin down, the heaviest first.
+    /// The inequalities that limit the margin, the largest share first.
     pub blocks: Vec<ConflictingBlock>,
     /// Changes that were tried and help; empty when none of those tried does.
     pub advice: Vec<Advice>,

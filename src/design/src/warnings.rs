@@ -1,4 +1,4 @@
-//! What a user should know of a design that is sound: values, to be put into words by who shows them.
+//! What a user should know of a design that is sound: values; the program that shows them adds the words.
 //!
 //! A warning is no error: nothing that was proved depends on it.
 

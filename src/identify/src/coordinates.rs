@@ -27,7 +27,7 @@ struct Change {
     origin: DVector<f64>,
 }
 
-/// How badly the map between two modes' states may be told from switches, in percent of fit.
+/// Least fit, in percent, with which the map between two modes' states must follow from switches.
 const LEAST_SWITCH_FIT: f64 = 50.0;
 /// Largest condition number of a change of coordinates.
 const WORST_CONDITION: f64 = 1e6;

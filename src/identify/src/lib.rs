@@ -15,7 +15,7 @@
 //! use ftc_identify::{Log, Settings, identify};
 //! use nalgebra::DMatrix;
 //!
-//! // y(k+1) = 0.8 y(k) + 0.5 u(k), told to move up and down.
+//! // y(k+1) = 0.8 y(k) + 0.5 u(k), the input moving up and down.
 //! let u = DMatrix::from_fn(200, 1, |k, _| if (k / 7) % 2 == 0 { 1.0 } else { -0.5 });
 //! let mut y = DMatrix::zeros(200, 1);
 //! for k in 0..199 {
@@ -56,8 +56,8 @@ pub struct Settings {
     pub order: Option<usize>,
     /// The largest order that is tried.
     pub largest_order: usize,
-    /// Periods, in samples, of a disturbance that is in the logs and that nobody measured (with its
-    /// harmonics): it is told from the plant, and is no part of the model.
+    /// Periods, in samples, of a disturbance that is in the logs and that was not measured (with
+    /// its harmonics): it is separated from the plant, and is no part of the model.
     pub periods: Vec<f64>,
 }
 
@@ -100,7 +100,7 @@ pub struct IdentifiedMode {
 pub enum Coordinates {
     /// There is one mode only.
     Single,
-    /// By the switches that were logged; the state after a switch is told from the state before
+    /// By the switches that were logged; the state after a switch follows from the state before
     /// with this fit, in percent.
     Switches {
         /// The worst fit of all modes.

@@ -5,7 +5,7 @@ use super::plant::{External, PlantSimulator, PlantState};
 use ftc_control::{Compensate, Controller, ControllerState};
 use serde::Serialize;
 
-/// Who closes the loop.
+/// What closes the loop.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Variant {

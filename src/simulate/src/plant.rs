@@ -203,7 +203,7 @@ impl PlantSimulator {
         let built_in = external.mode.is_none();
         state.mode = self.active_mode(external, tick);
         state.told = self.told_mode(external, state.mode, tick);
-        state.departed.plays = built_in;
+        state.departed.scenario_enabled = built_in;
         let Some(mode) = self.modes.get(state.mode) else {
             return;
         };

@@ -1,4 +1,4 @@
-//! What a user should know of a run that went through: values, to be put into words by who shows them.
+//! What a user should know of a run that went through: values; the program that shows them adds the words.
 
 use crate::closed_loop::Record;
 use crate::{Trajectory, Variant};

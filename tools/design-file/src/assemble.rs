@@ -74,18 +74,16 @@ pub(crate) fn request(file: &DesignFile, folder: &Path, notes: &Notes) -> Result
         },
     }
     .resolve()?;
+    let usual = Request::new(&file.name, plant, signals, scenario);
     Ok(Request {
-        name: file.name.clone(),
-        signals,
-        plant,
         true_plant,
         control,
-        bumpless: file.controller.bumpless.unwrap_or(defaults::BUMPLESS),
-        feedforward: file.controller.feedforward.unwrap_or(defaults::FEEDFORWARD),
+        bumpless: file.controller.bumpless.unwrap_or(usual.bumpless),
+        feedforward: file.controller.feedforward.unwrap_or(usual.feedforward),
         observer,
         estimator,
-        compensation: compensation(file),
-        scenario,
+        compensation: compensation(file, usual.compensation),
+        ..usual
     })
 }
 
@@ -122,7 +120,7 @@ fn signals(given: &schema::Signals, found: &plant::Found) -> Result<Signals, Str
     Ok(signals)
 }
 
-/// The state that remembers an input.
+/// The state that holds a past input.
 fn held(input: &Signal) -> Signal {
     Signal {
         name: format!("{} held", input.name),
@@ -255,48 +253,32 @@ fn control(
     signals: &Signals,
     dims: Dimensions,
 ) -> Result<ControlSpec, String> {
-    let tracked = tracked(given, dims)?;
-    let latency = given.latency.map_or(Ok(defaults::LATENCY), |latency| {
+    let usual = ControlSpec::tracking(tracked(given, dims)?, &signals.scaling());
+    let latency = given.latency.map_or(Ok(usual.latency), |latency| {
         at("controller.latency", check::count(latency, 0, 1))
     })?;
-    let decay = given.decay.unwrap_or(defaults::DECAY);
+    let decay = given.decay.unwrap_or(usual.decay);
     at("controller.decay", check::decay(decay))?;
-    let outputs: Vec<f64> = tracked
-        .iter()
-        .map(|&o| signals.outputs[o].nominal)
-        .collect();
-    let inputs: Vec<f64> = signals.inputs.iter().map(|input| input.nominal).collect();
-    let output_weight = weight(
-        "output_weight",
-        &given.output_weight,
-        defaults::OUTPUT_WEIGHT,
-        &outputs,
-    )?;
+    let output_weight = weight("output_weight", &given.output_weight, usual.output_weight)?;
     let integral_weight = weight(
         "integral_weight",
         &given.integral_weight,
-        defaults::INTEGRAL_WEIGHT,
-        &outputs,
+        usual.integral_weight,
     )?;
-    let input_weight = weight(
-        "input_weight",
-        &given.input_weight,
-        defaults::INPUT_WEIGHT,
-        &inputs,
-    )?;
+    let input_weight = weight("input_weight", &given.input_weight, usual.input_weight)?;
     Ok(ControlSpec {
-        tracked,
         latency,
-        lyapunov: lyapunov(given.lyapunov.unwrap_or(defaults::LYAPUNOV)),
+        lyapunov: given.lyapunov.map_or(usual.lyapunov, lyapunov),
         decay,
-        objective: match given.objective.unwrap_or(defaults::OBJECTIVE) {
-            ObjectiveKind::Attenuation => Objective::Attenuation,
-            ObjectiveKind::Decay => Objective::Decay,
+        objective: match given.objective {
+            None => usual.objective,
+            Some(ObjectiveKind::Attenuation) => Objective::Attenuation,
+            Some(ObjectiveKind::Decay) => Objective::Decay,
         },
-        resonators: Vec::new(),
         output_weight,
         integral_weight,
         input_weight,
+        ..usual
     })
 }
 
@@ -352,36 +334,32 @@ fn tracked(given: &schema::Controller, dims: Dimensions) -> Result<Vec<usize>, S
     Ok(tracked)
 }
 
-/// The weight of each channel; by default relative to the nominal values.
-fn weight(
-    key: &str,
-    given: &Option<NumberOrList>,
-    default: f64,
-    nominal: &[f64],
-) -> Result<Vec<f64>, String> {
+/// The weight of each channel.
+fn weight(key: &str, given: &Option<NumberOrList>, usual: Vec<f64>) -> Result<Vec<f64>, String> {
     let key = format!("controller.{key}");
     let Some(given) = given else {
-        return Ok(nominal.iter().map(|value| default / value).collect());
+        return Ok(usual);
     };
-    let weights = at(&key, given.spread(nominal.len()))?;
+    let weights = at(&key, given.spread(usual.len()))?;
     at(&key, check::each(&weights, check::not_negative))?;
     Ok(weights)
 }
 
 fn observer(given: &schema::Observer, control: &ControlSpec) -> Result<ObserverSpec, String> {
     use ftc_design::ObserverChoice as Kind;
-    let decay = given.decay.unwrap_or(control.decay);
+    let usual = ObserverSpec::beside(control);
+    let decay = given.decay.unwrap_or(usual.decay);
     at("observer.decay", check::decay(decay))?;
     Ok(ObserverSpec {
-        kind: match given.kind.unwrap_or(defaults::OBSERVER) {
-            ObserverKind::Uio => Kind::Uio,
-            ObserverKind::Luenberger => Kind::Luenberger,
-            ObserverKind::Kalman => Kind::Kalman,
-            ObserverKind::Auto => Kind::Auto,
+        kind: match given.kind {
+            None => usual.kind,
+            Some(ObserverKind::Uio) => Kind::Uio,
+            Some(ObserverKind::Luenberger) => Kind::Luenberger,
+            Some(ObserverKind::Kalman) => Kind::Kalman,
+            Some(ObserverKind::Auto) => Kind::Auto,
         },
         decay,
-        lyapunov: control.lyapunov,
-        noise: Vec::new(),
+        ..usual
     })
 }
 
@@ -432,16 +410,16 @@ fn estimator(
     dims: Dimensions,
     logs: &Logs,
 ) -> Result<EstimatorSpec, String> {
-    let database = database(given, logs)?;
-    let usual = match database {
-        DatabaseSource::Recorded(_) => EstimatorMethod::Reference,
-        DatabaseSource::Commission | DatabaseSource::Model => defaults::ESTIMATOR,
-    };
-    let method = match given.method.unwrap_or(usual) {
-        EstimatorMethod::Observer => parameters::EstimatorMethod::Observer,
-        EstimatorMethod::Reference => parameters::EstimatorMethod::Reference,
-        EstimatorMethod::Sliding => parameters::EstimatorMethod::Sliding,
-        EstimatorMethod::None => parameters::EstimatorMethod::None,
+    let usual = EstimatorSpec::default();
+    let database = database(given, logs)?.unwrap_or(usual.database);
+    let method = match (given.method, &database) {
+        // Only this method reads a log.
+        (None, DatabaseSource::Recorded(_)) => parameters::EstimatorMethod::Reference,
+        (None, _) => usual.method,
+        (Some(EstimatorMethod::Observer), _) => parameters::EstimatorMethod::Observer,
+        (Some(EstimatorMethod::Reference), _) => parameters::EstimatorMethod::Reference,
+        (Some(EstimatorMethod::Sliding), _) => parameters::EstimatorMethod::Sliding,
+        (Some(EstimatorMethod::None), _) => parameters::EstimatorMethod::None,
     };
     let response_length = match given.response_length {
         None => None,
@@ -451,14 +429,14 @@ fn estimator(
         )?),
     };
     let debounce = match given.debounce {
-        None => defaults::DEBOUNCE,
+        None => usual.debounce,
         Some(samples) => at(
             "estimator.debounce",
             check::count(samples, 1, LONGEST_DEBOUNCE),
         )? as u32,
     };
     let stuck_after = match given.stuck_after {
-        None => defaults::STUCK_AFTER,
+        None => usual.stuck_after,
         Some(samples) => at(
             "estimator.stuck_after",
             check::count(samples, 0, LONGEST_DEBOUNCE),
@@ -468,10 +446,10 @@ fn estimator(
         method,
         response_length,
         database,
-        threshold: threshold(given, dims)?,
+        threshold: threshold(given, dims, usual.threshold)?,
         debounce,
         stuck_after,
-        adapt: given.adapt.unwrap_or(defaults::ADAPT),
+        adapt: given.adapt.unwrap_or(usual.adapt),
         disturbance,
         hypotheses: hypotheses(given, dims)?,
     })
@@ -520,17 +498,18 @@ fn hypotheses(given: &schema::Estimator, dims: Dimensions) -> Result<HypothesesS
     })
 }
 
-fn database(given: &schema::Estimator, logs: &Logs) -> Result<DatabaseSource, String> {
+/// The database that is named, if any is.
+fn database(given: &schema::Estimator, logs: &Logs) -> Result<Option<DatabaseSource>, String> {
     let is_log = |name: &str| {
         let name = name.to_lowercase();
         LOG_ENDINGS.iter().any(|ending| name.ends_with(ending))
     };
     let files = match &given.database {
-        None => return Ok(defaults::DATABASE),
+        None => return Ok(None),
         Some(NameOrList::Name(name)) if name == "commission" => {
-            return Ok(DatabaseSource::Commission);
+            return Ok(Some(DatabaseSource::Commission));
         }
-        Some(NameOrList::Name(name)) if name == "model" => return Ok(DatabaseSource::Model),
+        Some(NameOrList::Name(name)) if name == "model" => return Ok(Some(DatabaseSource::Model)),
         Some(NameOrList::Name(name)) if !is_log(name) => {
             return Err(format!(
                 "estimator.database = \"{}\" is not a known value and no CSV file: {}",
@@ -554,10 +533,15 @@ fn database(given: &schema::Estimator, logs: &Logs) -> Result<DatabaseSource, St
                 .into(),
         );
     }
-    at("estimator.database", logs.read(files)).map(DatabaseSource::Recorded)
+    let recorded = at("estimator.database", logs.read(files))?;
+    Ok(Some(DatabaseSource::Recorded(recorded)))
 }
 
-fn threshold(given: &schema::Estimator, dims: Dimensions) -> Result<Threshold, String> {
+fn threshold(
+    given: &schema::Estimator,
+    dims: Dimensions,
+    usual: Threshold,
+) -> Result<Threshold, String> {
     match (&given.threshold, given.sigmas) {
         (Some(_), Some(_)) => Err(
             "estimator.threshold and estimator.sigmas exclude each other: give one of them".into(),
@@ -567,19 +551,20 @@ fn threshold(given: &schema::Estimator, dims: Dimensions) -> Result<Threshold, S
             at("estimator.threshold", check::each(&values, check::positive))?;
             Ok(Threshold::Given(values))
         }
-        (None, sigmas) => {
-            let sigmas = sigmas.unwrap_or(defaults::SIGMAS);
+        (None, None) => Ok(usual),
+        (None, Some(sigmas)) => {
             at("estimator.sigmas", check::positive(sigmas))?;
             Ok(Threshold::Sigmas(sigmas))
         }
     }
 }
 
-fn compensation(file: &DesignFile) -> parameters::Compensation {
-    match file.compensation.method.unwrap_or(defaults::COMPENSATION) {
-        CompensationMethod::VirtualSensor => parameters::Compensation::VirtualSensor,
-        CompensationMethod::Additive => parameters::Compensation::Additive,
-        CompensationMethod::None => parameters::Compensation::None,
+fn compensation(file: &DesignFile, usual: parameters::Compensation) -> parameters::Compensation {
+    match file.compensation.method {
+        None => usual,
+        Some(CompensationMethod::VirtualSensor) => parameters::Compensation::VirtualSensor,
+        Some(CompensationMethod::Additive) => parameters::Compensation::Additive,
+        Some(CompensationMethod::None) => parameters::Compensation::None,
     }
 }
 

@@ -13,7 +13,7 @@ use std::path::Path;
 
 /// A plant in samples and without direct feedthrough.
 pub(crate) struct Found {
-    /// The plant; its last states remember inputs where it had a direct feedthrough.
+    /// The plant; its last states hold past inputs where it had a direct feedthrough.
     pub(crate) plant: SwitchedPlant,
     /// How many do.
     pub(crate) held_inputs: usize,

@@ -219,7 +219,7 @@ pub enum ObserverKind {
 pub struct Estimator {
     /// How faults are estimated.
     pub method: Option<EstimatorMethod>,
-    /// Past inputs the output remembers, in samples.
+    /// Past inputs the output depends on, in samples.
     pub response_length: Option<i64>,
     /// `commission`, `model`, the name of a CSV file, or a list of one per mode.
     pub database: Option<NameOrList>,
@@ -241,7 +241,7 @@ pub struct Estimator {
     pub fault_rate: Option<f64>,
     /// Mean length of a fault in samples.
     pub fault_length: Option<f64>,
-    /// Whom to believe where a slow divergence could be a sensor's drift or a load.
+    /// Whether sensors or model are used where a slow divergence could be a sensor's drift or a load.
     pub ambiguous: Option<Ambiguous>,
     /// Largest correction, per sensor (number or p).
     pub authority: Option<NumberOrList>,

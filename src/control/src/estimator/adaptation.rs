@@ -2,7 +2,7 @@
 //!
 //! Recursive least squares without forgetting continues the fit of the database with healthy
 //! samples, so it starts from everything the database knows and moves the less the more it has
-//! seen. It must be unable to do harm, hence:
+//! seen. It must never increase the error, hence:
 //!
 //! * no decision depends on it: sensors are judged by the database alone, and only the estimate of a
 //!   fault that is declared, or of a reading that is missing, is refined. Otherwise a fault that
@@ -27,10 +27,10 @@ const MEMORY: f64 = 0.99;
 /// The adapted error must be this much smaller than the database's before it is preferred.
 const ADVANTAGE: f64 = 0.98;
 
-/// Largest change of an output that is believed, relative to the database's prediction of it.
-const BELIEVABLE: f64 = 0.05;
+/// Largest change of an output that is admitted, relative to the database's prediction of it.
+const ADMISSIBLE: f64 = 0.05;
 
-/// The same where next to nothing is predicted, in noise deviations.
+/// The same where the prediction is near zero, in noise deviations.
 const SIGMAS: f64 = 3.0;
 
 /// The adapted response of one mode, with `q = m j` regressors.
@@ -44,8 +44,8 @@ pub struct Adaptation {
     direction: Vec<f64>,
     /// What the change would add to the prediction, as learned (p).
     addition: Vec<f64>,
-    /// The largest change of each output that is believed in this sample (p).
-    room: Vec<f64>,
+    /// The largest change of each output that is admitted in this sample (p).
+    bound: Vec<f64>,
     /// Running means of the squared errors of the database's prediction (p).
     fixed_error: Vec<f64>,
     /// And of the adapted one (p).
@@ -58,7 +58,7 @@ crate::state!(Adaptation {
         covariance,
         direction,
         addition,
-        room,
+        bound,
         fixed_error,
         adapted_error
     ],
@@ -75,7 +75,7 @@ impl Adaptation {
             covariance: covariance(&predictor.factor),
             direction: vec![0.0; size],
             addition: vec![0.0; outputs],
-            room: vec![0.0; outputs],
+            bound: vec![0.0; outputs],
             fixed_error: vec![0.0; outputs],
             adapted_error: vec![0.0; outputs],
         }
@@ -96,20 +96,20 @@ impl Adaptation {
             *sum = kernel::bounded(kernel::dot(row, regressor));
         }
         let outputs = prediction.iter().zip(y0).zip(&predictor.deviation);
-        for (room, ((value, centre), deviation)) in self.room.iter_mut().zip(outputs) {
-            *room = kernel::bounded(BELIEVABLE * (value - centre).abs() + SIGMAS * deviation);
+        for (bound, ((value, centre), deviation)) in self.bound.iter_mut().zip(outputs) {
+            *bound = kernel::bounded(ADMISSIBLE * (value - centre).abs() + SIGMAS * deviation);
         }
     }
 
     /// What to add to the database's prediction of each sensor (p): nothing where that did not prove better.
     pub fn additions(&self) -> impl Iterator<Item = f64> {
         let scores = self.fixed_error.iter().zip(&self.adapted_error);
-        let additions = self.addition.iter().zip(&self.room);
+        let additions = self.addition.iter().zip(&self.bound);
         additions
             .zip(scores)
-            .map(|((&addition, &room), (&fixed, &adapted))| {
+            .map(|((&addition, &bound), (&fixed, &adapted))| {
                 if adapted < ADVANTAGE * fixed {
-                    addition.clamp(-room, room)
+                    addition.clamp(-bound, bound)
                 } else {
                     0.0
                 }
@@ -119,8 +119,8 @@ impl Adaptation {
     /// Learns from a healthy sample, the one last [predicted](Self::predict). `error` (p) is that of the
     /// database's prediction.
     pub fn learn(&mut self, regressor: &[f64], error: &[f64]) {
-        let believable = |(error, room): (&f64, &f64)| error.abs() <= *room;
-        if !error.iter().zip(&self.room).all(believable) {
+        let believable = |(error, bound): (&f64, &f64)| error.abs() <= *bound;
+        if !error.iter().zip(&self.bound).all(believable) {
             return;
         }
         let size = regressor.len().max(1);
@@ -131,11 +131,11 @@ impl Adaptation {
         let scale = 1.0 / (1.0 + kernel::dot(&self.direction, regressor).max(0.0));
         let rows = self.change.chunks_exact_mut(size).zip(&self.addition);
         let scores = self.fixed_error.iter_mut().zip(&mut self.adapted_error);
-        let errors = error.iter().zip(&self.room);
-        for (((row, &addition), (&error, &room)), (fixed, adapted)) in rows.zip(errors).zip(scores)
+        let errors = error.iter().zip(&self.bound);
+        for (((row, &addition), (&error, &bound)), (fixed, adapted)) in rows.zip(errors).zip(scores)
         {
-            remember(fixed, error);
-            remember(adapted, error - addition.clamp(-room, room));
+            update_mean(fixed, error);
+            update_mean(adapted, error - addition.clamp(-bound, bound));
             kernel::add_scaled(row, scale * (error - addition), &self.direction);
             kernel::bound(row);
         }
@@ -145,7 +145,7 @@ impl Adaptation {
 }
 
 /// Takes an error into a running mean of squares.
-fn remember(mean: &mut f64, error: f64) {
+fn update_mean(mean: &mut f64, error: f64) {
     *mean = kernel::bounded(MEMORY * *mean + (1.0 - MEMORY) * error * error);
 }
 
@@ -254,7 +254,7 @@ mod tests {
             adaptation.predict(&known, &phi, &[0.0], &[1.1]);
             adaptation.learn(&phi, &[1e-3 * f64::from(k)]);
             let added: f64 = adaptation.additions().sum();
-            assert!(added <= BELIEVABLE * 1.1 + SIGMAS * 0.01, "{added} at {k}");
+            assert!(added <= ADMISSIBLE * 1.1 + SIGMAS * 0.01, "{added} at {k}");
         }
     }
 }

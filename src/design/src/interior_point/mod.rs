@@ -3,7 +3,7 @@
 //! Every block is a signed sum of congruences of the Lyapunov matrices, plus a product `U Y V'` with
 //! its transpose, plus a scalar times a matrix. Nesterov-Todd scaling, Mehrotra's predictor and
 //! corrector, started infeasible at the identity. What comes back is a candidate, whatever its gap:
-//! the certificate judges it.
+//! the certificate decides.
 
 mod dense;
 mod newton;
@@ -123,7 +123,7 @@ const FIRST_GAP: f64 = 1e-2;
 /// Least ratio of the gaps of two points that are kept.
 const GAP_BETWEEN: f64 = 5.0;
 
-/// Maximises the scalar unknown from `symmetric = I`, `full = 0`, `scalar = 0`; `watch` is told of
+/// Maximises the scalar unknown from `symmetric = I`, `full = 0`, `scalar = 0`; `watch` is called at
 /// every iteration. `None` where not a single step could be made.
 pub(crate) fn maximise(
     problem: &Problem,

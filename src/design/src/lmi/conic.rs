@@ -184,10 +184,10 @@ const LARGEST_RESIDUAL: f64 = 1e-5;
 
 /// The ways to solve, in the order they are tried. One thread, so that the same problem gives the
 /// same bits; tight tolerances, since strict inequalities live from the last digits.
-fn settings() -> [DefaultSettings<f64>; 4] {
+fn settings() -> [DefaultSettings<f64>; 3] {
     let usual = DefaultSettings {
         verbose: false,
-        direct_solve_method: "faer".into(),
+        direct_solve_method: "qdldl".into(),
         max_threads: 1,
         chordal_decomposition_enable: true,
         tol_gap_abs: 1e-10,
@@ -195,19 +195,15 @@ fn settings() -> [DefaultSettings<f64>; 4] {
         tol_feas: 1e-9,
         ..DefaultSettings::default()
     };
-    let other_factorisation = DefaultSettings {
-        direct_solve_method: "qdldl".into(),
-        ..usual.clone()
-    };
     let undecomposed = DefaultSettings {
         chordal_decomposition_enable: false,
-        ..other_factorisation.clone()
+        ..usual.clone()
     };
     let unequilibrated = DefaultSettings {
         equilibrate_enable: false,
         ..undecomposed.clone()
     };
-    [usual, other_factorisation, undecomposed, unequilibrated]
+    [usual, undecomposed, unequilibrated]
 }
 
 /// What a status without a candidate means to the user.

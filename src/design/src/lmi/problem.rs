@@ -94,7 +94,7 @@ pub struct Margin {
     pub margin: f64,
     /// The unknowns that reach it.
     pub scalars: Vec<f64>,
-    /// Each inequality and its share (0 to 1) of the dual multiplier: who holds the margin down.
+    /// Each inequality and its share (0 to 1) of the dual multiplier: how much it limits the margin.
     pub weights: Vec<(BlockName, f64)>,
 }
 

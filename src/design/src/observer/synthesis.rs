@@ -1,4 +1,4 @@
-//! The road from a plant to a certified observer.
+//! From a plant to a certified observer.
 
 use super::detectable::check_detectable;
 use super::existence::{PerUnit, decoupling};

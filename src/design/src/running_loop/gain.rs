@@ -25,7 +25,7 @@ const STRICTNESS: [f64; 3] = [1e-3, 1e-4, 1e-5];
 /// By how much a level may lie above the norm, tried in turn.
 const ALLOWANCES: [f64; 11] = [2e-4, 1e-3, 2e-3, 5e-3, 0.01, 0.02, 0.05, 0.1, 0.3, 1.0, 3.0];
 
-/// A gain below this, in the units of the certificate, is not told from zero.
+/// A gain below this, in the units of the certificate, counts as zero.
 const SMALLEST: f64 = 1e-9;
 
 impl Channel<'_> {
@@ -100,7 +100,7 @@ impl Channel<'_> {
     /// `L` with `S = L L'`, the inverse of the storage function of the bounded-real lemma at `level`
     /// for a performance signal enlarged by `eps`.
     pub(super) fn storage(&self, level: f64, eps: f64) -> Option<DMatrix<f64>> {
-        let first = self.frame(level)?;
+        let first = self.equal_reach(level)?;
         let inverse = first.clone().try_inverse()?;
         let a = &inverse * self.a.midpoint() * &first;
         let b = &inverse * self.b.midpoint() / level;
@@ -122,7 +122,7 @@ impl Channel<'_> {
     }
 
     /// Coordinates in which the disturbance, in units of `level`, reaches every direction alike.
-    fn frame(&self, level: f64) -> Option<DMatrix<f64>> {
+    fn equal_reach(&self, level: f64) -> Option<DMatrix<f64>> {
         let (a, b) = (self.a.midpoint(), self.b.midpoint() / level);
         let n = a.nrows();
         let reach = &b * b.transpose();
@@ -215,7 +215,7 @@ impl Channel<'_> {
 
     /// `S` whose inverse solves `P = A'P A + C'C` for a signal, in units of `level`, enlarged a little.
     fn observability(&self, level: f64) -> Option<FactoredLyapunov> {
-        let first = self.frame(1.0)?;
+        let first = self.equal_reach(1.0)?;
         let inverse = first.clone().try_inverse()?;
         let a = &inverse * self.a.midpoint() * &first;
         let c = self.c.midpoint() * &first / power_of_two(level);

@@ -53,12 +53,12 @@ fn attempt(subject: &Subject, loops: &[(usize, usize, Loop)], each: bool) -> Opt
         return None;
     }
     let own = scaled.iter().filter(|(i, j, _)| i == j);
-    let frame = Frame::of(own.map(|(.., scaled)| scaled.channel()))?;
-    let (level, functions) = least(subject.modes(), &scaled, &frame, each)?;
+    let normal = Normalisation::of(own.map(|(.., scaled)| scaled.channel()))?;
+    let (level, functions) = least(subject.modes(), &scaled, &normal, each)?;
     let unit = scaled.first()?.2.unit;
     let lyapunov: Vec<FactoredLyapunov> = functions
         .iter()
-        .map(|function| frame.restore(function))
+        .map(|function| normal.restore(function))
         .collect::<Option<_>>()?;
     ALLOWANCES.iter().find_map(|allowance| {
         let candidate = SwitchingGain {
@@ -73,14 +73,14 @@ fn attempt(subject: &Subject, loops: &[(usize, usize, Loop)], each: bool) -> Opt
 
 /// Coordinates in which the mean storage function of the modes is the identity, and a unit of the
 /// disturbance in which the gain is near one.
-struct Frame {
+struct Normalisation {
     /// `T`: `x = T xi`.
     basis: DMatrix<f64>,
     inverse: DMatrix<f64>,
     level: f64,
 }
 
-impl Frame {
+impl Normalisation {
     fn of<'a>(channels: impl Iterator<Item = Channel<'a>>) -> Option<Self> {
         let channels: Vec<Channel> = channels.collect();
         let norms = channels.iter().map(Channel::norm);
@@ -110,14 +110,14 @@ impl Frame {
     }
 }
 
-/// The least level and the functions that reach it, in the coordinates of the frame.
+/// The least level and the functions that reach it, in normalised coordinates.
 fn least(
     modes: usize,
     loops: &[(usize, usize, Scaled)],
-    frame: &Frame,
+    normal: &Normalisation,
     each: bool,
 ) -> Option<(f64, Vec<DMatrix<f64>>)> {
-    let size = frame.basis.nrows();
+    let size = normal.basis.nrows();
     let mut problem = Problem::new();
     let functions: Vec<Variable> = (0..if each { modes } else { 1 })
         .map(|_| problem.symmetric(size))
@@ -127,10 +127,10 @@ fn least(
     let strict = DMatrix::identity(size, size) * STRICTNESS;
     for (i, j, scaled) in loops {
         let channel = scaled.channel();
-        let a = &frame.inverse * channel.a.midpoint() * &frame.basis;
-        let b = &frame.inverse * channel.b.midpoint() / frame.level;
-        let c = channel.c.midpoint() * &frame.basis;
-        let d = channel.d.midpoint() / frame.level;
+        let a = &normal.inverse * channel.a.midpoint() * &normal.basis;
+        let b = &normal.inverse * channel.b.midpoint() / normal.level;
+        let c = channel.c.midpoint() * &normal.basis;
+        let d = channel.d.midpoint() / normal.level;
         let followers: Vec<usize> = match each && i == j {
             true => (0..modes).collect(),
             false => vec![*j],
@@ -153,5 +153,5 @@ fn least(
     let reached = level.value(&found.scalars)[(0, 0)].max(0.0).sqrt();
     let values = functions.iter();
     let values = values.map(|function| riccati::symmetric(function.value(&found.scalars)));
-    Some((reached * frame.level, values.collect()))
+    Some((reached * normal.level, values.collect()))
 }

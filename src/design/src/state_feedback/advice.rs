@@ -5,7 +5,7 @@ use crate::{Advice, ControlSpec, Run};
 use ftc_plant::SwitchedPlant;
 use ftc_plant::scaling::Scaling;
 
-/// Tries the usual ways out, one per kind, cheapest change first.
+/// Tries the usual ways out, one per kind, the smallest change first.
 pub(super) fn search(
     plant: &SwitchedPlant,
     spec: &ControlSpec,
@@ -14,7 +14,7 @@ pub(super) fn search(
 ) -> Vec<Advice> {
     let works = |candidate: &ControlSpec| succeeds(plant, candidate, scaling, run);
     let mut advice = Vec::new();
-    let slower = slowest_step(spec, &works);
+    let slower = fastest_feasible_decay(spec, &works);
     advice.extend(slower.map(Advice::Decay));
     let other = spec.lyapunov.weaker().iter().find_map(|&lyapunov| {
         let candidate = ControlSpec {
@@ -24,7 +24,8 @@ pub(super) fn search(
         if candidate.decay < 1.0 && works(&candidate) {
             return Some(Advice::Lyapunov(lyapunov));
         }
-        slowest_step(&candidate, &works).map(|decay| Advice::LyapunovAndDecay(lyapunov, decay))
+        fastest_feasible_decay(&candidate, &works)
+            .map(|decay| Advice::LyapunovAndDecay(lyapunov, decay))
     });
     advice.extend(other);
     advice.extend(fewer_outputs(spec, &works).map(Advice::Tracked));
@@ -37,7 +38,7 @@ pub(super) fn search(
 }
 
 /// The fastest decay on a coarse ladder, slower than asked, that works.
-fn slowest_step(spec: &ControlSpec, works: &dyn Fn(&ControlSpec) -> bool) -> Option<f64> {
+fn fastest_feasible_decay(spec: &ControlSpec, works: &dyn Fn(&ControlSpec) -> bool) -> Option<f64> {
     Advice::DECAYS.into_iter().find(|&decay| {
         let slower = ControlSpec {
             decay,

@@ -1,8 +1,8 @@
 //! The design by the interior-point method that uses the structure, and by Riccati equations where
 //! even that would take minutes.
 
-use super::frame::{Frame, Part};
-use super::synthesis::{AGREEMENT, Levels, Optimum, REFRAMINGS, Road, SACRIFICES};
+use super::synthesis::{AGREEMENT, Levels, Optimum, Problem, RELAXATIONS, TRANSFORMATIONS};
+use super::transformation::{Part, Transformation};
 use super::{REJECTION, StateFeedback, riccati, structured};
 use crate::Lyapunov;
 
@@ -18,10 +18,10 @@ const SMALL: usize = 24;
 /// How many points of the central path are tried.
 const CENTRED: usize = 5;
 
-/// What a point of the central path gives up of its own level, for rounding.
-const PATH_SACRIFICE: f64 = 1e-7;
+/// Relative increase of the level of a point of the central path, for rounding.
+const PATH_RELAXATION: f64 = 1e-7;
 
-/// A level this far, relatively, above the least one is well inside.
+/// Relative distance from the least level above which a point counts as strictly inside.
 const INSIDE: f64 = 3e-6;
 
 /// The least level of a group, and the way there.
@@ -33,7 +33,7 @@ pub(super) struct Found {
     doubtful: bool,
 }
 
-impl Road<'_> {
+impl Problem<'_> {
     /// The design from the coordinates of regulators; `None` where any part of it falls short.
     pub(super) fn direct(&self) -> Option<StateFeedback> {
         let groups = self.groups();
@@ -44,17 +44,17 @@ impl Road<'_> {
             return Some(design);
         }
         let least = groups.iter().map(|group| {
-            let regulated = Frame::of_regulated(&self.models, group, self.spec.decay)?;
+            let regulated = Transformation::of_regulated(&self.models, group, self.spec.decay)?;
             self.settled_level(&regulated.with_signals(&self.models, group), group)
         });
         let mut least = least.collect::<Option<Vec<_>>>()?;
-        let (smallest, others) = SACRIFICES.split_first()?;
+        let (smallest, others) = RELAXATIONS.split_first()?;
         if let Some(design) = self.with_margin(&groups, &least, *smallest) {
             return Some(design);
         }
         // Once more, in the coordinates that the first answer suggests.
         for (group, found) in groups.iter().zip(&mut least) {
-            let again = self.direct_level(&found.optimum.frame, group);
+            let again = self.direct_level(&found.optimum.transformation, group);
             if let Some(again) = again.filter(|again| again.optimum.level < found.optimum.level) {
                 *found = again;
             }
@@ -68,18 +68,18 @@ impl Road<'_> {
             })
     }
 
-    /// Gains of largest margin at the least levels but for a `sacrifice`, certified.
+    /// Gains of largest margin at the least levels, each increased by the factor `1 + relaxation`, certified.
     fn with_margin(
         &self,
         groups: &[Vec<usize>],
         least: &[Found],
-        sacrifice: f64,
+        relaxation: f64,
     ) -> Option<StateFeedback> {
         let mut levels = Levels::new(self);
         let mut parts = Vec::new();
         for (group, found) in groups.iter().zip(least) {
-            let level = levels.set(group, &found.optimum, sacrifice);
-            parts.extend(self.direct_centre(group, &found.optimum.frame, level)?);
+            let level = levels.set(group, &found.optimum, relaxation);
+            parts.extend(self.direct_centre(group, &found.optimum.transformation, level)?);
         }
         self.certified(parts, Some(levels)).ok()
     }
@@ -96,8 +96,8 @@ impl Road<'_> {
         for (group, found) in groups.iter().zip(least) {
             let at = found.centred.len().checked_sub(1 + back)?;
             let (level, passed) = &found.centred[at];
-            let sacrifice = (level / found.optimum.level - 1.0).max(0.0) + PATH_SACRIFICE;
-            levels.set(group, &found.optimum, sacrifice);
+            let relaxation = (level / found.optimum.level - 1.0).max(0.0) + PATH_RELAXATION;
+            levels.set(group, &found.optimum, relaxation);
             parts.extend(passed.iter().cloned());
         }
         self.certified(parts, Some(levels)).ok()
@@ -107,23 +107,30 @@ impl Road<'_> {
     pub(super) fn direct_centre(
         &self,
         group: &[usize],
-        frame: &Frame,
+        transformation: &Transformation,
         level: f64,
     ) -> Option<Vec<Part>> {
-        let (view, level) = (frame.view(&self.models), frame.view_level(level));
+        let (view, level) = (
+            transformation.view(&self.models),
+            transformation.view_level(level),
+        );
         let found = structured::centred(&view, self.spec, group, level, &self.run).ok()?;
-        Some(frame.restore(found))
+        Some(transformation.restore(found))
     }
 
     /// The least level of a group, sought from these coordinates and again from those it suggests while
     /// the answer leaves doubt and improves.
-    pub(super) fn settled_level(&self, frame: &Frame, group: &[usize]) -> Option<Found> {
-        let mut found = self.direct_level(frame, group)?;
-        for _ in 0..REFRAMINGS {
+    pub(super) fn settled_level(
+        &self,
+        transformation: &Transformation,
+        group: &[usize],
+    ) -> Option<Found> {
+        let mut found = self.direct_level(transformation, group)?;
+        for _ in 0..TRANSFORMATIONS {
             if !found.doubtful {
                 break;
             }
-            let again = self.direct_level(&found.optimum.frame, group);
+            let again = self.direct_level(&found.optimum.transformation, group);
             let settled = found.optimum.level * (1.0 - AGREEMENT);
             match again {
                 Some(again) if again.optimum.level < settled => found = again,
@@ -134,31 +141,43 @@ impl Road<'_> {
     }
 
     /// The least level of a group, sought in these coordinates.
-    pub(super) fn direct_level(&self, frame: &Frame, group: &[usize]) -> Option<Found> {
+    pub(super) fn direct_level(
+        &self,
+        transformation: &Transformation,
+        group: &[usize],
+    ) -> Option<Found> {
         let models = &self.models;
-        let floor = frame.view_level(REJECTION.powi(2));
-        let view = frame.view(models);
+        let floor = transformation.view_level(REJECTION.powi(2));
+        let view = transformation.view(models);
         let path = structured::least_level(&view, self.spec, group, floor, &self.run).ok()?;
         let (level, bound) = (
-            frame.restore_level(path.level),
-            frame.restore_level(path.bound),
+            transformation.restore_level(path.level),
+            transformation.restore_level(path.bound),
         );
         let optimal = level < (1.0 + AGREEMENT) * bound.max(REJECTION.powi(2));
         let centred: Vec<_> = path
             .centred
             .into_iter()
-            .map(|(level, parts)| (frame.restore_level(level), frame.restore(parts)))
+            .map(|(level, parts)| {
+                (
+                    transformation.restore_level(level),
+                    transformation.restore(parts),
+                )
+            })
             .collect();
         // The last point that is still well inside gives better coordinates than the end itself.
         let inside = centred
             .iter()
             .rfind(|(passed, _)| *passed > level * (1.0 + INSIDE));
-        let parts = inside.map_or_else(|| frame.restore(path.parts), |(_, parts)| parts.clone());
+        let parts = inside.map_or_else(
+            || transformation.restore(path.parts),
+            |(_, parts)| parts.clone(),
+        );
         Some(Found {
             optimum: Optimum {
                 level,
                 bound,
-                frame: Frame::of_attenuated(models, &parts, level)?,
+                transformation: Transformation::of_attenuated(models, &parts, level)?,
             },
             centred,
             doubtful: path.at_reach || !optimal,
@@ -171,17 +190,18 @@ impl Road<'_> {
         let mut parts = Vec::new();
         for (mode, model) in self.models.iter().enumerate() {
             let group = [mode];
-            let frame = Frame::of_regulated(&self.models, &group, self.spec.decay)?;
-            let frame = frame.with_signals(&self.models, &group);
-            let view = frame.view(std::slice::from_ref(model));
+            let transformation =
+                Transformation::of_regulated(&self.models, &group, self.spec.decay)?;
+            let transformation = transformation.with_signals(&self.models, &group);
+            let view = transformation.view(std::slice::from_ref(model));
             let found = riccati::game(&view[0], mode, self.spec.decay)?;
             let least = Optimum {
-                level: frame.restore_level(found.level),
-                bound: frame.restore_level(found.bound),
-                frame,
+                level: transformation.restore_level(found.level),
+                bound: transformation.restore_level(found.bound),
+                transformation,
             };
             levels.set(&group, &least, 0.0);
-            parts.extend(least.frame.restore(vec![found.part]));
+            parts.extend(least.transformation.restore(vec![found.part]));
         }
         self.certified(parts, Some(levels)).ok()
     }

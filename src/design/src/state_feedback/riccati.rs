@@ -6,7 +6,7 @@
 //! with `g I - E'XE > 0`; `K = -(D'D)^-1 B'X (I + G X)^-1 A` and `S = X^-1`. On `A/a`, `B/a` with `a < 1`
 //! the same `X` proves the decay rate `a` as well, at a larger `g`.
 
-use super::frame::Part;
+use super::transformation::Part;
 use crate::augmented::AugmentedMode;
 use crate::certificate::FactoredLyapunov;
 use crate::riccati::solve;
@@ -19,8 +19,8 @@ const COARSE: f64 = 1e-3;
 /// Steps between the asked rate and 1 in the search for the slowest rate that proves the asked one.
 const HALVINGS: usize = 4;
 
-/// Relative addition to the cost `H'H`, which leaves the inequalities room in every direction.
-const ROOM: f64 = 1e-6;
+/// Relative addition to the cost `H'H`, which makes the inequalities strict in every direction.
+const COST_ADDITION: f64 = 1e-6;
 
 /// A level and what proves it.
 pub(super) struct Game {
@@ -59,7 +59,8 @@ pub(super) fn game(model: &AugmentedMode, mode: usize, decay: f64) -> Option<Gam
         cost: model.h.tr_mul(&model.h),
     };
     let (bound, _) = data.least(1.0, 0.0, None, ACCURACY)?;
-    let level_at = |rate: f64, accuracy: f64| data.least(rate, ROOM, Some(bound), accuracy);
+    let level_at =
+        |rate: f64, accuracy: f64| data.least(rate, COST_ADDITION, Some(bound), accuracy);
     let (level, free) = level_at(1.0, ACCURACY)?;
     if data.decays(&free, decay) {
         return data.finish(level, bound, free, mode);

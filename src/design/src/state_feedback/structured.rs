@@ -11,7 +11,7 @@
 //!
 //! Where `G = S` (all but `switched`), `A S` and its transpose are a difference of congruences of `S`.
 
-use super::frame::Part;
+use super::transformation::Part;
 use crate::augmented::AugmentedMode;
 use crate::blocks::{BlockKind, BlockName};
 use crate::certificate::FactoredLyapunov;
@@ -32,7 +32,7 @@ const REACH: f64 = 1e6;
 const AT_REACH: f64 = 1e-2;
 
 /// How much larger than the identity the Lyapunov matrices of a centred solution may be on average.
-const ROOM: f64 = 10.0;
+const CENTRED_TRACE: f64 = 10.0;
 
 /// What becomes of the scalar unknown.
 #[derive(Clone, Copy)]
@@ -382,7 +382,7 @@ pub(super) fn centred(
     let mut theorem = Theorem::new(models, spec, group, Scalar::Margin, run);
     theorem.require_attenuation(1.0 / level);
     theorem.require_decay();
-    theorem.require_reach(ROOM);
+    theorem.require_reach(CENTRED_TRACE);
     let solution = theorem.solve(
         "centred gains",
         Settings {

@@ -1,14 +1,14 @@
-//! The road from the augmented model to certified gains.
+//! From the augmented model to certified gains.
 //!
-//! Scale; decide feasibility by the margin problem; minimise `g = gamma^2` in coordinates where the
-//! solver is at ease; give up a hair of the optimum for the largest margin, so that the result lies
-//! strictly inside; scale back; certify.
+//! Scale; decide feasibility by the margin problem; minimise `g = gamma^2` in well-conditioned
+//! coordinates; relax `g` by a few parts in 1e5 and maximise the margin, so that the result lies strictly
+//! inside; scale back; certify.
 
 use super::advice;
-use super::frame::{Frame, Part};
 use super::proof::provable_dwell;
 use super::structured;
 use super::theorem;
+use super::transformation::{Part, Transformation};
 use super::{ModeGains, REJECTION, StateFeedback};
 use crate::augmented::{AugmentedMode, augment, scaled};
 use crate::certificate::{ControlCertificate, FactoredLyapunov};
@@ -20,8 +20,8 @@ use ftc_plant::scaling::Scaling;
 use ftc_plant::{Dimensions, SwitchedPlant, spectral_radius};
 use nalgebra::DMatrix;
 
-/// Relative sacrifices of `g = gamma^2` for a margin, tried in turn until the certificate holds.
-pub(super) const SACRIFICES: [f64; 6] = [2e-5, 1e-4, 1e-3, 1e-2, 1e-1, 1.0];
+/// Relative increases of `g = gamma^2` for a margin, tried in turn until the certificate holds.
+pub(super) const RELAXATIONS: [f64; 6] = [2e-5, 1e-4, 1e-3, 1e-2, 1e-1, 1.0];
 
 /// A margin below this is no margin: the solver's own accuracy.
 const SMALLEST_MARGIN: f64 = 1e-9;
@@ -30,10 +30,10 @@ const SMALLEST_MARGIN: f64 = 1e-9;
 const SURE_MARGIN: f64 = 1e-6;
 
 /// A margin above this needs no better coordinates.
-const THICK_MARGIN: f64 = 1e-2;
+const SUFFICIENT_MARGIN: f64 = 1e-2;
 
 /// How often better coordinates are sought.
-pub(super) const REFRAMINGS: usize = 12;
+pub(super) const TRANSFORMATIONS: usize = 12;
 
 /// A least level that better coordinates change by less than this, relatively, is the least.
 pub(super) const AGREEMENT: f64 = 1e-5;
@@ -53,7 +53,7 @@ pub fn synthesise(
     synthesise_with(plant, spec, scaling, &Run::default())
 }
 
-/// [`synthesise`] with a chosen solver and someone who watches. A verdict that there is no design is
+/// [`synthesise`] with a chosen solver, its progress reported. A verdict that there is no design is
 /// given only after another scaling has confirmed it.
 ///
 /// # Errors
@@ -87,31 +87,31 @@ fn attempt(
     let dims = Dimensions::check(plant).map_err(DesignError::Request)?;
     spec.check(dims).map_err(DesignError::Request)?;
     let units = Units::choose(plant, spec, scaling);
-    let road = Road {
+    let problem = Problem {
         plant,
         spec,
         run: *run,
         models: augment(plant, spec, &units),
         units,
     };
-    let disturbed = road.models.iter().any(|model| model.e.amax() > 0.0);
+    let disturbed = problem.models.iter().any(|model| model.e.amax() > 0.0);
     let optimised = spec.objective == Objective::Attenuation && disturbed;
     if !(optimised && run.solver == Solver::Structured) {
-        return road.step_by_step(optimised);
+        return problem.step_by_step(optimised);
     }
-    let Some(direct) = road.direct() else {
-        return road.step_by_step(true);
+    let Some(direct) = problem.direct() else {
+        return problem.step_by_step(true);
     };
-    if is_sharp(&direct) || !road.is_small() {
+    if is_sharp(&direct) || !problem.is_small() {
         return Ok(direct);
     }
     (run.watch)(Step::GeneralSolver);
-    let general = Road {
+    let general = Problem {
         run: Run {
             solver: Solver::General,
             ..*run
         },
-        ..road
+        ..problem
     };
     Ok(match general.step_by_step(true) {
         Ok(other) if is_sharp(&other) || largest_gamma(&other) < largest_gamma(&direct) => other,
@@ -139,7 +139,7 @@ fn largest_gamma(design: &StateFeedback) -> f64 {
     gamma.fold(0.0, f64::max)
 }
 
-/// Whether a request leads all the way to certified gains. The cheap question comes first: whether
+/// Whether a request leads all the way to certified gains. The fastest test comes first: whether
 /// decay and guarantee can be had at all.
 pub(super) fn succeeds(
     plant: &SwitchedPlant,
@@ -203,9 +203,9 @@ fn stable_by(
         Ok((margin, parts)) if margin.margin >= SURE_MARGIN => return Ok((margin, Some(parts))),
         uncertain => uncertain,
     };
-    let regulated = Frame::of_regulated(models, group, spec.decay).map(|frame| {
-        let found = stabilise(solver, &frame.view(models), spec, group, run);
-        found.map(|(margin, parts)| (margin, frame.restore(parts)))
+    let regulated = Transformation::of_regulated(models, group, spec.decay).map(|transformation| {
+        let found = stabilise(solver, &transformation.view(models), spec, group, run);
+        found.map(|(margin, parts)| (margin, transformation.restore(parts)))
     });
     match regulated {
         Some(Ok((margin, parts))) if margin.margin >= SURE_MARGIN => {
@@ -220,23 +220,24 @@ fn stable_by(
     Ok((margin, shown.then_some(parts)))
 }
 
-/// The gains solved for again in the coordinates they suggest, as long as the margin is thin and
-/// doubles.
-fn thickened(
+/// The gains solved for again in the coordinates they suggest, as long as the margin is below
+/// [`SUFFICIENT_MARGIN`] and doubles.
+fn with_larger_margin(
     models: &[AugmentedMode],
     spec: &ControlSpec,
     group: &[usize],
     (mut margin, mut parts): Stabilised,
     run: &Run,
 ) -> Stabilised {
-    for _ in 0..REFRAMINGS {
-        let frame = Frame::of_stabilised(models, &parts);
-        let Some(frame) = frame.filter(|_| margin.margin < THICK_MARGIN) else {
+    for _ in 0..TRANSFORMATIONS {
+        let transformation = Transformation::of_stabilised(models, &parts);
+        let Some(transformation) = transformation.filter(|_| margin.margin < SUFFICIENT_MARGIN)
+        else {
             break;
         };
-        match stabilise(run.solver, &frame.view(models), spec, group, run) {
+        match stabilise(run.solver, &transformation.view(models), spec, group, run) {
             Ok((better, found)) if better.margin > 2.0 * margin.margin => {
-                (margin, parts) = (better, frame.restore(found));
+                (margin, parts) = (better, transformation.restore(found));
             }
             _ => break,
         }
@@ -254,14 +255,14 @@ enum Verdict {
 pub(super) struct Optimum {
     /// `g = gamma^2` in the design's units.
     pub level: f64,
-    /// No `g` is below this, as the solver sees it; zero where it does not tell.
+    /// The solver's lower bound of `g` (not proved); zero where it gives none.
     pub bound: f64,
     /// Coordinates in which the solution is near the identity.
-    pub frame: Frame,
+    pub transformation: Transformation,
 }
 
 /// What every stage works on.
-pub(super) struct Road<'a> {
+pub(super) struct Problem<'a> {
     plant: &'a SwitchedPlant,
     pub spec: &'a ControlSpec,
     pub run: Run<'a>,
@@ -269,7 +270,7 @@ pub(super) struct Road<'a> {
     pub models: Vec<AugmentedMode>,
 }
 
-impl Road<'_> {
+impl Problem<'_> {
     /// Modes that share a problem.
     pub fn groups(&self) -> Vec<Vec<usize>> {
         self.spec.lyapunov.groups(self.models.len())
@@ -297,7 +298,9 @@ impl Road<'_> {
         Ok(match stable(&self.models, self.spec, group, &self.run)? {
             (margin, Some(parts)) => {
                 let found = (margin, parts);
-                Verdict::Stable(thickened(&self.models, self.spec, group, found, &self.run).1)
+                Verdict::Stable(
+                    with_larger_margin(&self.models, self.spec, group, found, &self.run).1,
+                )
             }
             (margin, None) => Verdict::Conflict(margin),
         })
@@ -308,41 +311,44 @@ impl Road<'_> {
     fn least_level(&self, group: &[usize], start: &[Part]) -> Result<Optimum, SolverFailure> {
         let models = &self.models;
         let (size, inputs) = models[0].b.shape();
-        let mut frame =
-            Frame::of_stabilised(models, start).unwrap_or_else(|| Frame::identity(size, inputs));
+        let mut transformation = Transformation::of_stabilised(models, start)
+            .unwrap_or_else(|| Transformation::identity(size, inputs));
         if self.run.solver == Solver::Structured {
-            if let Some(found) = self.settled_level(&frame, group) {
+            if let Some(found) = self.settled_level(&transformation, group) {
                 return Ok(found.optimum);
             }
             (self.run.watch)(Step::GeneralSolver);
         }
         let (mut least, mut bound): (Option<f64>, f64) = (None, 0.0);
-        for _ in 0..REFRAMINGS {
-            let floor = frame.view_level(REJECTION.powi(2));
-            let view = frame.view(models);
+        for _ in 0..TRANSFORMATIONS {
+            let floor = transformation.view_level(REJECTION.powi(2));
+            let view = transformation.view(models);
             let Ok(found) = theorem::least_level(&view, self.spec, group, floor) else {
                 break;
             };
-            let level = frame.restore_level(found.level.max(floor));
+            let level = transformation.restore_level(found.level.max(floor));
             if least.is_some_and(|least| (level / least - 1.0).abs() < AGREEMENT) {
-                (least, bound) = (Some(level), frame.restore_level(found.bound.max(0.0)));
+                (least, bound) = (
+                    Some(level),
+                    transformation.restore_level(found.bound.max(0.0)),
+                );
                 break;
             }
-            let parts = frame.restore(found.parts);
-            let Some(better) = Frame::of_attenuated(models, &parts, level) else {
+            let parts = transformation.restore(found.parts);
+            let Some(better) = Transformation::of_attenuated(models, &parts, level) else {
                 break;
             };
-            (least, frame) = (Some(level), better);
+            (least, transformation) = (Some(level), better);
         }
         let level = least.ok_or(SolverFailure::NumericalTrouble)?;
         Ok(Optimum {
             level,
             bound,
-            frame,
+            transformation,
         })
     }
 
-    /// Theorem T2: the least `gamma`, the gains that reach it but for a hair, and their proof.
+    /// Theorem T2: the least `gamma`, gains that reach it up to the relaxation, and their proof.
     fn attenuate(&self, stable: &[Vec<Part>]) -> Result<StateFeedback, DesignError> {
         let groups = self.groups();
         let mut least = Vec::new();
@@ -350,8 +356,8 @@ impl Road<'_> {
             least.push(self.least_level(group, start)?);
         }
         let mut outcome = Err(DesignError::Solver(SolverFailure::NumericalTrouble));
-        for sacrifice in SACRIFICES {
-            outcome = self.centred(&groups, &least, sacrifice);
+        for relaxation in RELAXATIONS {
+            outcome = self.centred(&groups, &least, relaxation);
             if outcome.is_ok() {
                 break;
             }
@@ -359,27 +365,28 @@ impl Road<'_> {
         outcome
     }
 
-    /// Gains of largest margin at the least levels but for a `sacrifice`, certified.
+    /// Gains of largest margin at the least levels, each increased by the factor `1 + relaxation`, certified.
     fn centred(
         &self,
         groups: &[Vec<usize>],
         least: &[Optimum],
-        sacrifice: f64,
+        relaxation: f64,
     ) -> Result<StateFeedback, DesignError> {
         let mut levels = Levels::new(self);
         let mut parts = Vec::new();
         for (group, least) in groups.iter().zip(least) {
-            let (frame, level) = (&least.frame, levels.set(group, least, sacrifice));
+            let (transformation, level) =
+                (&least.transformation, levels.set(group, least, relaxation));
             let structured = match self.run.solver {
-                Solver::Structured => self.direct_centre(group, frame, level),
+                Solver::Structured => self.direct_centre(group, transformation, level),
                 Solver::General => None,
             };
             parts.extend(match structured {
                 Some(found) => found,
                 None => {
-                    let view = frame.view(&self.models);
-                    let level = frame.view_level(level);
-                    frame.restore(theorem::centred(&view, self.spec, group, level)?)
+                    let view = transformation.view(&self.models);
+                    let level = transformation.view_level(level);
+                    transformation.restore(theorem::centred(&view, self.spec, group, level)?)
                 }
             });
         }
@@ -433,19 +440,19 @@ pub(super) struct Levels {
 }
 
 impl Levels {
-    pub fn new(road: &Road) -> Self {
-        let modes = road.models.len();
+    pub fn new(problem: &Problem) -> Self {
+        let modes = problem.models.len();
         Self {
             gamma: vec![0.0; modes],
             optimum: vec![0.0; modes],
-            physical: road.units.performance / road.units.disturbance,
+            physical: problem.units.performance / problem.units.disturbance,
         }
     }
 
-    /// Notes the least level `g` of a group, gives up `sacrifice` of it, and returns the `g` that is
-    /// left to prove.
-    pub fn set(&mut self, group: &[usize], least: &Optimum, sacrifice: f64) -> f64 {
-        let relaxed = least.level * (1.0 + sacrifice);
+    /// Notes the least level `g` of a group, increases it by the factor `1 + relaxation`, and returns the `g`
+    /// to prove.
+    pub fn set(&mut self, group: &[usize], least: &Optimum, relaxation: f64) -> f64 {
+        let relaxed = least.level * (1.0 + relaxation);
         for &mode in group {
             self.optimum[mode] = least.bound.sqrt() * self.physical;
             self.gamma[mode] = relaxed.sqrt() * self.physical;

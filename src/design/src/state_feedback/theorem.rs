@@ -1,6 +1,6 @@
 //! Theorems T1 and T2 as they stand: unknowns, block matrices, and how to read the gains.
 
-use super::frame::Part;
+use super::transformation::Part;
 use crate::augmented::AugmentedMode;
 use crate::blocks::{BlockKind, BlockName};
 use crate::certificate::FactoredLyapunov;
@@ -266,7 +266,7 @@ fn least_level_within(
 }
 
 /// How much larger than the identity the Lyapunov matrices of a centred solution may be on average.
-const ROOM: f64 = 10.0;
+const CENTRED_TRACE: f64 = 10.0;
 
 /// The gains of largest margin at a given `g` (T2), in coordinates where Lyapunov matrices near the
 /// identity will do.
@@ -290,7 +290,7 @@ pub(super) fn centred(
     );
     require_decay(&mut problem, models, spec, group, &unknowns);
     let (matrices, total) = matrices(spec.lyapunov, &unknowns, models);
-    problem.require_trace_below(&matrices, ROOM * total);
+    problem.require_trace_below(&matrices, CENTRED_TRACE * total);
     read(
         group,
         &unknowns,

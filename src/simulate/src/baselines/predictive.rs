@@ -2,7 +2,7 @@
 //!
 //! The model of the active mode is augmented with a constant output disturbance `d`, estimated by
 //! a steady Kalman filter, so the measured output is followed without offset. There is no fault
-//! estimation: a sensor that lies is believed, which is the point of the comparison.
+//! estimation: a faulty reading is used as it is, which is the point of the comparison.
 //!
 //! Over a horizon of `N` samples it minimises
 //!

@@ -24,13 +24,13 @@ pub struct Departed {
     /// Scratch for injected noise (p).
     pub(super) draws: Vec<f64>,
     /// Whether the scenario plays.
-    pub(super) plays: bool,
+    pub(super) scenario_enabled: bool,
 }
 
 ftc_control::state!(Departed {
     parts: [applied, change, held, late, reading, draws],
     constants: [],
-    counters: [plays]
+    counters: [scenario_enabled]
 });
 
 impl Departed {
@@ -43,7 +43,7 @@ impl Departed {
             late: point.y.repeat(deviation.sensor_delay),
             reading: point.y.clone(),
             draws: vec![0.0; point.y.len()],
-            plays: true,
+            scenario_enabled: true,
         }
     }
 
@@ -98,7 +98,7 @@ impl PlantSimulator {
         for (value, gain) in departed.applied.iter_mut().zip(&self.deviation.input_gain) {
             *value *= gain;
         }
-        if !departed.plays || !self.moves_inputs() {
+        if !departed.scenario_enabled || !self.moves_inputs() {
             return;
         }
         for (input, (value, held)) in departed
@@ -137,7 +137,7 @@ impl PlantSimulator {
         for (value, gain) in departed.change.iter_mut().zip(&self.deviation.input_gain) {
             *value *= gain;
         }
-        if !departed.plays {
+        if !departed.scenario_enabled {
             return;
         }
         for fault in &self.deviation.actuator_faults {
@@ -165,7 +165,7 @@ impl PlantSimulator {
 
     /// Adds loads to the disturbance.
     pub(super) fn load_disturbance(&self, state: &mut PlantState) {
-        if self.deviation.loads.is_empty() || !state.departed.plays {
+        if self.deviation.loads.is_empty() || !state.departed.scenario_enabled {
             return;
         }
         for (channel, value) in state.disturbance.iter_mut().enumerate() {
@@ -175,7 +175,7 @@ impl PlantSimulator {
 
     /// Adds loads to the state.
     pub(super) fn load_state(&self, state: &mut PlantState) {
-        if self.deviation.loads.is_empty() || !state.departed.plays {
+        if self.deviation.loads.is_empty() || !state.departed.scenario_enabled {
             return;
         }
         for (index, value) in state.x.iter_mut().enumerate() {

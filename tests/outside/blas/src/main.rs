@@ -200,7 +200,7 @@ fn main() {
     };
     let spec = ControlSpec {
         decay: 0.98,
-        ..ControlSpec::new(plant.dimensions())
+        ..ControlSpec::unweighted(plant.dimensions())
     };
     let scaling = Scaling::automatic(&plant);
     // The structured solver needs no BLAS; the general one does.

@@ -1,7 +1,7 @@
-//! Coordinates in which a solver is at ease.
+//! Coordinates in which the inequalities are well conditioned.
 //!
-//! An interior-point method wants its unknowns near the identity. A rough solution tells which
-//! coordinates make them so: with `S = L L'` and `x~ = L xi` the Lyapunov matrix becomes `I`. All of
+//! An interior-point method converges best with unknowns near the identity. A rough solution gives
+//! coordinates that make them so: with `S = L L'` and `x~ = L xi` the Lyapunov matrix becomes `I`. All of
 //! (T1) and (T2) is invariant under this congruence, so only the solver sees it; the certificate
 //! is stated in the design's own units.
 
@@ -22,7 +22,7 @@ pub(super) struct Part {
 
 /// A change of coordinates with units for disturbance and performance signal.
 #[derive(Clone, Debug)]
-pub(super) struct Frame {
+pub(super) struct Transformation {
     /// `L`: `x~ = L xi`.
     basis: DMatrix<f64>,
     inverse: DMatrix<f64>,
@@ -32,7 +32,7 @@ pub(super) struct Frame {
     performance: f64,
 }
 
-impl Frame {
+impl Transformation {
     /// The design's own coordinates.
     pub fn identity(size: usize, inputs: usize) -> Self {
         Self {
@@ -44,7 +44,7 @@ impl Frame {
         }
     }
 
-    /// Coordinates in which the mean Lyapunov matrix of a rough solution (found in one frame) is
+    /// Coordinates in which the mean Lyapunov matrix of a rough solution (found in one set of coordinates) is
     /// the identity; `None` when it is not positive definite.
     fn of(models: &[AugmentedMode], parts: &[Part]) -> Option<Self> {
         let first = &parts.first()?.lyapunov;
@@ -86,8 +86,9 @@ impl Frame {
     /// them whenever it can be stabilised so, however badly its states are scaled. `None` when a
     /// regulator does not exist.
     pub fn of_regulated(models: &[AugmentedMode], group: &[usize], decay: f64) -> Option<Self> {
-        const HASTE: f64 = 1.3;
-        let faster = decay.min(0.999).powf(HASTE);
+        /// The regulators are designed for the asked decay to this power.
+        const DECAY_EXPONENT: f64 = 1.3;
+        let faster = decay.min(0.999).powf(DECAY_EXPONENT);
         let part = |&mode: &usize| {
             let model = &models[mode];
             let cost = regulator_cost(&(&model.a / faster), &(&model.b / faster))?;
@@ -121,7 +122,7 @@ impl Frame {
     /// Coordinates from a stabilising solution, with the units in which disturbance and closed-loop
     /// performance signal are near one.
     pub fn of_stabilised(models: &[AugmentedMode], parts: &[Part]) -> Option<Self> {
-        let mut frame = Self::of(models, parts)?;
+        let mut transformation = Self::of(models, parts)?;
         let largest = |matrices: &mut dyn Iterator<Item = DMatrix<f64>>| {
             let norm = matrices.map(|matrix| matrix.norm()).fold(0.0, f64::max);
             if norm > 0.0 { norm } else { 1.0 }
@@ -129,24 +130,24 @@ impl Frame {
         let disturbance = largest(
             &mut parts
                 .iter()
-                .map(|part| &frame.inverse * &models[part.mode].e),
+                .map(|part| &transformation.inverse * &models[part.mode].e),
         );
         let performance = largest(&mut parts.iter().map(|part| {
             let model = &models[part.mode];
-            (&model.h + &model.d * &part.gain) * &frame.basis
+            (&model.h + &model.d * &part.gain) * &transformation.basis
         }));
-        frame.disturbance = disturbance;
-        frame.performance = performance;
-        Some(frame.with_inputs(models, parts))
+        transformation.disturbance = disturbance;
+        transformation.performance = performance;
+        Some(transformation.with_inputs(models, parts))
     }
 
     /// Coordinates from a rough optimum of (T2) at level `g`, in which the new optimum is near 1.
     pub fn of_attenuated(models: &[AugmentedMode], parts: &[Part], level: f64) -> Option<Self> {
         let disturbance = level.sqrt();
-        let frame = Self::of(models, parts)?.with_inputs(models, parts);
+        let transformation = Self::of(models, parts)?.with_inputs(models, parts);
         (disturbance.is_normal() && disturbance > 0.0).then_some(Self {
             disturbance,
-            ..frame
+            ..transformation
         })
     }
 
