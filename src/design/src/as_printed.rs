@@ -7,7 +7,7 @@ use super::augmented::augment;
 use super::blocks::{BlockKind, BlockName};
 use super::lmi::{Affine, Inequality, Margin, Problem};
 use super::verdict::{ConflictingBlock, DesignError, by_weight};
-use super::{ControlSpec, Units};
+use super::{ControlSpec, RequestError, Units};
 use ftc_plant::{Dimensions, SwitchedPlant};
 use serde::Serialize;
 
@@ -43,14 +43,16 @@ impl PrintedVerdict {
 
 /// The printed theorems have one block `Q` for states and integrators: they need as many of these
 /// as of those.
-fn check(plant: &SwitchedPlant, equation: &str) -> Result<Dimensions, DesignError> {
-    let dims = Dimensions::check(plant).map_err(DesignError::Request)?;
+fn check(plant: &SwitchedPlant, equation: &'static str) -> Result<Dimensions, DesignError> {
+    let dims = Dimensions::check(plant)?;
     match dims.states == dims.outputs {
         true => Ok(dims),
-        false => Err(DesignError::Request(format!(
-            "equation {equation} as printed needs as many outputs as states, but the plant has {} and {}",
-            dims.outputs, dims.states
-        ))),
+        false => Err(RequestError::Printed {
+            equation,
+            outputs: dims.outputs,
+            states: dims.states,
+        }
+        .into()),
     }
 }
 
@@ -117,7 +119,7 @@ pub fn theorem_1(plant: &SwitchedPlant) -> Result<PrintedVerdict, DesignError> {
 /// solver fails.
 pub fn theorem_2(plant: &SwitchedPlant, spec: &ControlSpec) -> Result<PrintedVerdict, DesignError> {
     let dims = check(plant, "(36)")?;
-    spec.check(dims).map_err(DesignError::Request)?;
+    spec.check(dims)?;
     let (n, s) = (dims.states, dims.disturbances);
     let models = augment(plant, spec, &Units::unit(plant, spec.tracked.len()));
     let mut problem = Problem::new();

@@ -6,8 +6,8 @@ pub use super::harmonics::KnownDisturbance;
 use super::hypotheses::HypothesesSpec;
 use super::matrices::{dense, plain};
 use super::{
-    ControlSpec, ControllerDesign, Design, DesignError, FORMAT, Failure, ObserverSpec, Run, Signal,
-    Signals, check_controllable, synthesise_with,
+    ControlSpec, ControllerDesign, Design, DesignError, FORMAT, Failure, ObserverSpec,
+    RequestError, Run, Signal, Signals, check_controllable, synthesise_with,
 };
 use crate::running_loop::{TRANSFER_DECAY, TransferCertificate};
 use ftc_control::parameters::{
@@ -173,12 +173,13 @@ pub fn assemble(request: Request) -> Result<Design, DesignError> {
 /// # Errors
 /// As [`assemble`], with the part that was found.
 pub fn assemble_with(request: Request, run: &Run) -> Result<Design, Failure> {
-    let dims = Dimensions::check(&request.plant).map_err(DesignError::Request)?;
+    let dims = Dimensions::check(&request.plant).map_err(DesignError::from)?;
     let asked = request.control.check(dims);
-    asked.map_err(DesignError::Request)?;
-    let estimator = estimator(&request, dims).map_err(DesignError::Request)?;
+    asked.map_err(DesignError::from)?;
+    let estimator = estimator(&request, dims).map_err(DesignError::from)?;
     let scaling = request.signals.scaling();
-    check_controllable(&request.plant, &request.control, &scaling).map_err(DesignError::Request)?;
+    check_controllable(&request.plant, &request.control, &scaling)
+        .map_err(|error| DesignError::Request(error.into()))?;
     let observer = ObserverSpec {
         noise: observer_noise(&request),
         ..request.observer.clone()
@@ -189,12 +190,7 @@ pub fn assemble_with(request: Request, run: &Run) -> Result<Design, Failure> {
         && request.plant.modes.len() > 1
         && !synthesis.certify_transfer(&request.plant)
     {
-        return Err(DesignError::Request(
-            "controller.bumpless = true cannot be proved for this design: set it to false, ask for another decay, or for \
-             lyapunov = \"dwell\""
-                .into(),
-        )
-        .into());
+        return Err(DesignError::from(RequestError::Bumpless).into());
     }
     let input_limits = limits(&request.signals.inputs);
     let feedback = feedback(
@@ -275,7 +271,7 @@ pub fn feedback(
 }
 
 /// Predictors, thresholds and harmonics.
-fn estimator(request: &Request, dims: Dimensions) -> Result<Estimator, String> {
+fn estimator(request: &Request, dims: Dimensions) -> Result<Estimator, RequestError> {
     let spec = &request.estimator;
     let outputs = &request.signals.outputs;
     let response_length = match spec.method {
@@ -324,23 +320,23 @@ fn estimator(request: &Request, dims: Dimensions) -> Result<Estimator, String> {
 }
 
 /// The response length asked for, or the one after which the response has decayed.
-fn response_length(request: &Request, dims: Dimensions) -> Result<usize, String> {
+fn response_length(request: &Request, dims: Dimensions) -> Result<usize, RequestError> {
     let decayed = commissioning::response_length(&request.plant.modes)?;
     let length = request.estimator.response_length.unwrap_or(decayed);
     let most = LONGEST_RESPONSE.min(MOST_COEFFICIENTS / dims.inputs);
     if (1..=most).contains(&length) {
         Ok(length)
     } else {
-        Err(format!(
-            "the response length is {length} samples, but with {} inputs it must lie between 1 and {most}: \
-             set estimator.response_length, or choose a longer sample_time",
-            dims.inputs
-        ))
+        Err(RequestError::ResponseLength {
+            length,
+            inputs: dims.inputs,
+            most,
+        })
     }
 }
 
 /// The predictor of each mode.
-fn predictors(request: &Request, length: usize) -> Result<Vec<Predictor>, String> {
+fn predictors(request: &Request, length: usize) -> Result<Vec<Predictor>, RequestError> {
     let noise = &request.scenario.noise;
     let predictor = |(index, mode): (usize, &Mode)| {
         let amplitudes = amplitudes(mode, &request.signals.inputs);
@@ -356,13 +352,16 @@ fn predictors(request: &Request, length: usize) -> Result<Vec<Predictor>, String
                 let seed = COMMISSIONING_SEED + index as u64;
                 let database =
                     commissioning::commission(mode, &amplitudes, noise, length + counted, seed);
-                commissioning::predictor(&database, length, None)
-                    .map_err(|what| format!("mode {}: {what}", index + 1))
+                commissioning::predictor(&database, length, None).map_err(|error| {
+                    RequestError::Database {
+                        mode: index + 1,
+                        error,
+                    }
+                })
             }
             DatabaseSource::Recorded(logs) => {
                 let stretches = logs.get(index).map_or(&[][..], Vec::as_slice);
-                recorded(request, stretches, length)
-                    .map_err(|what| format!("mode {}: {what}", index + 1))
+                recorded(request, index + 1, stretches, length)
             }
         }
     };
@@ -370,8 +369,13 @@ fn predictors(request: &Request, length: usize) -> Result<Vec<Predictor>, String
     modes.enumerate().map(predictor).collect()
 }
 
-/// The predictor of a log of one mode, in which the disturbance was at work.
-fn recorded(request: &Request, stretches: &[Database], length: usize) -> Result<Predictor, String> {
+/// The predictor of a log of one mode (from 1), in which the disturbance was at work.
+fn recorded(
+    request: &Request,
+    mode: usize,
+    stretches: &[Database],
+    length: usize,
+) -> Result<Predictor, RequestError> {
     let known = request.estimator.disturbance.as_ref();
     let disturbance = known.map(|known| RecordedDisturbance {
         period: known.period / request.plant.sample_time,
@@ -381,21 +385,24 @@ fn recorded(request: &Request, stretches: &[Database], length: usize) -> Result<
     let samples: usize = stretches.iter().map(Database::samples).sum();
     let most = MOST_REGRESSORS / (inputs.len() * length).max(1);
     if samples > most {
-        return Err(format!(
-            "the log has {samples} samples, more than are needed: shorten it to at most {most}"
-        ));
+        return Err(RequestError::LongLog {
+            mode,
+            samples,
+            most,
+        });
     }
-    let predictor = commissioning::predictor_of_stretches(stretches, length, disturbance)?;
+    let predictor = commissioning::predictor_of_stretches(stretches, length, disturbance)
+        .map_err(|error| RequestError::Database { mode, error })?;
     let units: Vec<f64> = inputs.iter().map(|input| input.nominal).collect();
     let (ratio, input, lag) = commissioning::weakest_direction(&predictor, &units);
     if ratio < LEAST_EXCITATION {
-        return Err(format!(
-            "the log excites input {} ({}) {lag} samples back too little (1 : {:.0e} of the strongest direction): \
-             record a run in which every input moves on its own",
-            input + 1,
-            inputs[input].name,
-            1.0 / ratio.max(f64::MIN_POSITIVE)
-        ));
+        return Err(RequestError::Excitation {
+            mode,
+            input: input + 1,
+            name: inputs[input].name.clone(),
+            lag,
+            ratio,
+        });
     }
     Ok(predictor)
 }

@@ -57,6 +57,7 @@ pub struct ControlCertificate {
 
 /// Why a certificate does not check.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
 pub enum CertificateError {
     /// An inequality could not be proved.
     #[error("the {0} could not be proved")]
@@ -64,6 +65,13 @@ pub enum CertificateError {
     /// Sizes, units or claims do not fit the plant; one sentence says which.
     #[error("{0}")]
     Malformed(String),
+}
+
+impl CertificateError {
+    /// What does not fit, in a sentence.
+    pub(crate) fn malformed(what: impl std::fmt::Display) -> Self {
+        Self::Malformed(what.to_string())
+    }
 }
 
 /// Proves a claim about a mode and its successor (indices from 0).

@@ -36,20 +36,70 @@ const TRUNCATION: f64 = 1e-7;
 /// The longest response this estimator accepts.
 pub const LONGEST_RESPONSE: usize = 2000;
 
+/// Why there is no response length, or no predictor.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum CommissioningError {
+    /// A mode is unstable.
+    #[error(
+        "mode {mode}: A has spectral radius {radius:.4}, but the estimator needs a stable mode (below 1): \
+         stabilise the plant first or set estimator.method = \"none\""
+    )]
+    Unstable {
+        /// The mode, from 1.
+        mode: usize,
+        /// Its spectral radius.
+        radius: f64,
+    },
+    /// A mode's response lasts longer than [`LONGEST_RESPONSE`].
+    #[error(
+        "mode {mode}: the response is still felt after {LONGEST_RESPONSE} samples (spectral radius {radius:.6}): \
+         choose a longer sample_time for this loop"
+    )]
+    SlowResponse {
+        /// The mode, from 1.
+        mode: usize,
+        /// Its spectral radius.
+        radius: f64,
+    },
+    /// The database has fewer samples than unknowns.
+    #[error(
+        "{} are too few to identify {unknowns} response coefficients: record at least {needed}",
+        shape(*samples, *stretches, *response_length)
+    )]
+    TooFewSamples {
+        /// Samples found.
+        samples: usize,
+        /// Stretches they are in.
+        stretches: usize,
+        /// Samples at the start of each stretch that serve as past inputs only.
+        response_length: usize,
+        /// Coefficients to identify.
+        unknowns: usize,
+        /// Samples needed.
+        needed: usize,
+    },
+    /// No input moves.
+    #[error("the database excites nothing: every recorded input stays at its operating point")]
+    NoExcitation,
+    /// An input is infinite or no number.
+    #[error("the database cannot be factorised: its inputs are not finite")]
+    NotFinite,
+}
+
 /// The smallest `j` with `|C A^j| <= 1e-7 |C|` in every mode.
 ///
 /// # Errors
 /// Names the mode that is unstable or decays too slowly.
-pub fn response_length(modes: &[Mode]) -> Result<usize, String> {
+pub fn response_length(modes: &[Mode]) -> Result<usize, CommissioningError> {
     let mut longest = 1;
     for (index, mode) in modes.iter().enumerate() {
         let radius = spectral_radius(&mode.a);
         if radius >= 1.0 {
-            return Err(format!(
-                "mode {}: A has spectral radius {radius:.4}, but the estimator needs a stable mode (below 1): \
-                 stabilise the plant first or set estimator.method = \"none\"",
-                index + 1
-            ));
+            return Err(CommissioningError::Unstable {
+                mode: index + 1,
+                radius,
+            });
         }
         let target = TRUNCATION * mode.c.norm();
         let mut response = mode.c.clone();
@@ -58,11 +108,10 @@ pub fn response_length(modes: &[Mode]) -> Result<usize, String> {
             response = &response * &mode.a;
             length += 1;
             if length > LONGEST_RESPONSE {
-                return Err(format!(
-                    "mode {}: the response is still felt after {LONGEST_RESPONSE} samples (spectral radius {radius:.6}): \
-                     choose a longer sample_time for this loop",
-                    index + 1
-                ));
+                return Err(CommissioningError::SlowResponse {
+                    mode: index + 1,
+                    radius,
+                });
             }
         }
         longest = longest.max(length);
@@ -122,7 +171,7 @@ pub fn predictor(
     database: &Database,
     response_length: usize,
     disturbance: Option<RecordedDisturbance>,
-) -> Result<Predictor, String> {
+) -> Result<Predictor, CommissioningError> {
     let stretches = std::slice::from_ref(database);
     predictor_of_stretches(stretches, response_length, disturbance)
 }
@@ -144,7 +193,7 @@ pub fn predictor_of_stretches(
     stretches: &[Database],
     response_length: usize,
     disturbance: Option<RecordedDisturbance>,
-) -> Result<Predictor, String> {
+) -> Result<Predictor, CommissioningError> {
     let (m, p) = stretches.first().map_or((0, 0), |stretch| {
         (stretch.inputs.ncols(), stretch.outputs.ncols())
     });
@@ -174,10 +223,7 @@ pub fn predictor_of_stretches(
     });
     let ridge = 1e-9 * regressors.columns(waves, inputs).norm() / (inputs as f64).sqrt();
     if ridge == 0.0 {
-        return Err(
-            "the database excites nothing: every recorded input stays at its operating point"
-                .into(),
-        );
+        return Err(CommissioningError::NoExcitation);
     }
     let mut stacked = regressors
         .clone()
@@ -195,7 +241,7 @@ pub fn predictor_of_stretches(
     let factor = qr.r();
     let solution = factor
         .solve_upper_triangular(&rotated.rows(0, unknowns).into_owned())
-        .ok_or("the database cannot be factorised: its inputs are not finite")?;
+        .ok_or(CommissioningError::NotFinite)?;
     let error = targets - regressors * &solution;
     let freedom = (samples - unknowns) as f64;
     let deviation = error
@@ -219,18 +265,25 @@ fn windows(stretches: &[Database], response_length: usize) -> Vec<(&Database, us
     stretches.iter().flat_map(of).collect()
 }
 
-fn too_few(stretches: &[Database], unknowns: usize, response_length: usize) -> String {
+fn too_few(stretches: &[Database], unknowns: usize, response_length: usize) -> CommissioningError {
     let total: usize = stretches.iter().map(Database::samples).sum();
     let needed = unknowns + 1 + response_length * stretches.len().max(1);
-    let shape = match stretches.len() {
-        0 | 1 => format!("{total} samples"),
+    CommissioningError::TooFewSamples {
+        samples: total,
+        stretches: stretches.len(),
+        response_length,
+        unknowns,
+        needed,
+    }
+}
+
+fn shape(samples: usize, stretches: usize, response_length: usize) -> String {
+    match stretches {
+        0 | 1 => format!("{samples} samples"),
         count => format!(
-            "{total} samples in {count} stretches, each of which spends its first {response_length} on the past,"
+            "{samples} samples in {count} stretches, each of which spends its first {response_length} on the past,"
         ),
-    };
-    format!(
-        "{shape} are too few to identify {unknowns} response coefficients: record at least {needed}"
-    )
+    }
 }
 
 /// How well each input was excited: the smallest singular value of `R` over the largest, and the
@@ -416,7 +469,9 @@ mod tests {
     fn an_unstable_mode_is_refused_by_number() {
         let mut mode = stable_mode(&[0.3; 21]);
         mode.a *= 2.0;
-        let message = response_length(&[stable_mode(&[0.3; 21]), mode]).unwrap_err();
+        let message = response_length(&[stable_mode(&[0.3; 21]), mode])
+            .unwrap_err()
+            .to_string();
         assert!(message.starts_with("mode 2:"), "{message}");
     }
 }

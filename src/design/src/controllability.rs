@@ -10,18 +10,58 @@ use nalgebra::{Complex, DMatrix};
 /// Singular values below this fraction of the largest count as zero.
 const RANK_TOLERANCE: f64 = 1e-11;
 
+/// What the inputs cannot move. Modes and harmonics count from 1.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum Uncontrollable {
+    /// An eigenvalue of a mode that decays more slowly than asked.
+    #[error(
+        "mode {mode}: (A, B) is uncontrollable: no input moves its eigenvalue {} of magnitude {:.4}, \
+         which decays more slowly than controller.decay = {decay}: add an input or ask for a slower decay",
+        shown(*eigenvalue), eigenvalue.norm()
+    )]
+    Eigenvalue {
+        /// The mode.
+        mode: usize,
+        /// The eigenvalue.
+        eigenvalue: Complex<f64>,
+        /// The decay that is asked for.
+        decay: f64,
+    },
+    /// The tracked outputs at rest.
+    #[error(
+        "mode {mode}: (A, B) cannot hold the tracked outputs at arbitrary values, the pair with integral action is \
+         uncontrollable: track fewer outputs, or outputs on which the inputs act independently"
+    )]
+    Tracked {
+        /// The mode.
+        mode: usize,
+    },
+    /// The tracked outputs at a harmonic of the disturbance.
+    #[error(
+        "mode {mode}: the inputs cannot move the tracked outputs at harmonic {harmonic} of the disturbance, so no internal \
+         model can reject it: use fewer harmonics, track fewer outputs, or set internal_model = false"
+    )]
+    Harmonic {
+        /// The mode.
+        mode: usize,
+        /// The harmonic.
+        harmonic: usize,
+    },
+}
+
 /// Checks by the Popov-Belevitch-Hautus test that every eigenvalue of every mode, the integrators'
 /// and the resonators' included, that decays more slowly than asked can be moved by the inputs.
 ///
 /// A verdict that something is uncontrollable is given only after another scaling has confirmed it.
 ///
 /// # Errors
-/// One sentence that names the mode and the eigenvalue.
+/// The mode, and what its inputs cannot move.
 pub fn check_controllable(
     plant: &SwitchedPlant,
     spec: &ControlSpec,
     scaling: &Scaling,
-) -> Result<(), String> {
+) -> Result<(), Uncontrollable> {
     let first = check_scaled(plant, spec, scaling);
     first.or_else(|what| check_scaled(plant, spec, &other_scaling(plant, scaling)).or(Err(what)))
 }
@@ -31,35 +71,29 @@ fn check_scaled(
     plant: &SwitchedPlant,
     spec: &ControlSpec,
     scaling: &Scaling,
-) -> Result<(), String> {
+) -> Result<(), Uncontrollable> {
     let units = Units::choose(plant, spec, scaling);
     let models = augment(plant, spec, &units);
     for (index, (model, mode)) in models.iter().zip(&plant.modes).enumerate() {
         let number = index + 1;
         for eigenvalue in mode.a.complex_eigenvalues().iter() {
             if eigenvalue.norm() >= spec.decay && !is_movable(model, *eigenvalue) {
-                return Err(format!(
-                    "mode {number}: (A, B) is uncontrollable: no input moves its eigenvalue {} of magnitude {:.4}, \
-                     which decays more slowly than controller.decay = {}: add an input or ask for a slower decay",
-                    shown(*eigenvalue),
-                    eigenvalue.norm(),
-                    spec.decay
-                ));
+                return Err(Uncontrollable::Eigenvalue {
+                    mode: number,
+                    eigenvalue: *eigenvalue,
+                    decay: spec.decay,
+                });
             }
         }
         if !is_movable(model, Complex::new(1.0, 0.0)) {
-            return Err(format!(
-                "mode {number}: (A, B) cannot hold the tracked outputs at arbitrary values, the pair with integral action is \
-                 uncontrollable: track fewer outputs, or outputs on which the inputs act independently"
-            ));
+            return Err(Uncontrollable::Tracked { mode: number });
         }
         for (harmonic, angle) in spec.resonators.iter().enumerate() {
             if !is_movable(model, Complex::from_polar(1.0, *angle)) {
-                return Err(format!(
-                    "mode {number}: the inputs cannot move the tracked outputs at harmonic {} of the disturbance, so no internal \
-                     model can reject it: use fewer harmonics, track fewer outputs, or set internal_model = false",
-                    harmonic + 1
-                ));
+                return Err(Uncontrollable::Harmonic {
+                    mode: number,
+                    harmonic: harmonic + 1,
+                });
             }
         }
     }

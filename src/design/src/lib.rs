@@ -51,6 +51,7 @@ mod lyapunov;
 mod matrices;
 pub mod observer;
 mod record;
+mod request;
 pub(crate) mod riccati;
 pub mod running_loop;
 #[cfg(feature = "solver")]
@@ -65,17 +66,18 @@ pub mod warnings;
 
 pub use blocks::{BlockKind, BlockName};
 pub use certificate::{CertificateError, ControlCertificate};
-pub use controllability::check_controllable;
+pub use controllability::{Uncontrollable, check_controllable};
 #[cfg(feature = "solver")]
 pub use hypotheses::HypothesesSpec;
 pub use lyapunov::{DwellTime, Lyapunov};
 pub use matrices::{dense, mode_models, plain};
 pub use observer::{LostCertificate, ObserverCertificate, ObserverDesign};
 pub use record::{ControllerDesign, Design, FORMAT, Signal, Signals};
+pub use request::RequestError;
 pub use running_loop::{LostSensors, RunningLoop, SwitchingGain};
 #[cfg(feature = "solver")]
 pub use solver::{Run, Solver, Step};
-pub use spec::{ControlSpec, Objective, ObserverChoice, ObserverSpec};
+pub use spec::{ControlSpec, Objective, ObserverChoice, ObserverSpec, SpecError};
 pub use state_feedback::{ModeGains, StateFeedback};
 pub use synthesis::{Failure, Synthesis};
 #[cfg(feature = "solver")]

@@ -121,7 +121,7 @@ impl Design {
             ));
         }
         let plant = &self.plant;
-        let dims = Dimensions::check(plant)?;
+        let dims = Dimensions::check(plant).map_err(|error| error.to_string())?;
         let modes = plant.modes.len();
         let scenario = &self.scenario;
         let tracked = &self.controller.feedback.tracked;
@@ -195,9 +195,10 @@ impl Design {
             ));
         }
         let (motion, deviation) = self.true_plant.clone().into_parts();
-        deviation.check(plant)?;
+        deviation.check(plant).map_err(|error| error.to_string())?;
         if let TruePlant::Linear { plant: truth } = &motion
-            && (Dimensions::check(truth)? != dims || truth.modes.len() != modes)
+            && (Dimensions::check(truth).map_err(|error| error.to_string())? != dims
+                || truth.modes.len() != modes)
         {
             return Err("the true plant has other sizes than the designed one".into());
         }

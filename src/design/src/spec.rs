@@ -32,6 +32,89 @@ pub struct ControlSpec {
     pub input_weight: Vec<f64>,
 }
 
+/// What is wrong with a request, whatever the plant's numbers. Outputs and harmonics count from 1.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum SpecError {
+    /// No output is tracked.
+    #[error("tracked is empty: name at least one output")]
+    NothingTracked,
+    /// More outputs are tracked than there are inputs.
+    #[error(
+        "{tracked} tracked outputs need at least {tracked} inputs, but the plant has {inputs}: track fewer outputs"
+    )]
+    TooFewInputs {
+        /// Tracked outputs.
+        tracked: usize,
+        /// Inputs of the plant.
+        inputs: usize,
+    },
+    /// An output that does not exist is tracked.
+    #[error("tracked names output {output}, but the plant has {outputs}")]
+    UnknownOutput {
+        /// The output.
+        output: usize,
+        /// Outputs of the plant.
+        outputs: usize,
+    },
+    /// An output is tracked twice.
+    #[error("tracked names output {0} twice")]
+    TrackedTwice(usize),
+    /// The latency is neither 0 nor 1 samples.
+    #[error("latency is {0}: give 0 or 1 samples")]
+    Latency(usize),
+    /// A decay rate outside (0, 1].
+    #[error("{name} is {decay}: give a number above 0 and at most 1")]
+    Decay {
+        /// Which decay rate.
+        name: &'static str,
+        /// Its value.
+        decay: f64,
+    },
+    /// Decay rate 1 under the dwell guarantee.
+    #[error("{0} = 1 gives no finite dwell time: give a number below 1")]
+    NoDwellTime(&'static str),
+    /// A harmonic lies where no resonator can be told from the integrator or the highest frequency.
+    #[error(
+        "the internal model cannot hold harmonic {harmonic} of the disturbance, whose period is {samples:.6} samples: \
+         choose a sample_time at which it lies between {shortest:.4} and {longest:.0} samples, or use fewer harmonics or none \
+         (internal_model = false)"
+    )]
+    Harmonic {
+        /// The harmonic.
+        harmonic: usize,
+        /// Its period in samples.
+        samples: f64,
+        /// The shortest period a resonator can have.
+        shortest: f64,
+        /// The longest.
+        longest: f64,
+    },
+    /// Two resonators have one frequency.
+    #[error(
+        "resonator {resonator} turns by {angle} radians per sample, as an earlier one does: name each frequency once"
+    )]
+    SameFrequency {
+        /// The later one.
+        resonator: usize,
+        /// Its angle in radians per sample.
+        angle: f64,
+    },
+    /// A list of weights has the wrong length.
+    #[error("{weight} has {found} entries: give one number or {needed}")]
+    WeightCount {
+        /// Which weights.
+        weight: &'static str,
+        /// Entries found.
+        found: usize,
+        /// Entries needed.
+        needed: usize,
+    },
+    /// A weight is negative, infinite or no number.
+    #[error("{0} must be finite and not negative")]
+    Weight(&'static str),
+}
+
 /// What the gains are chosen for.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
@@ -90,35 +173,34 @@ impl ControlSpec {
         self.tracked.len() * (1 + 2 * self.resonators.len())
     }
 
-    /// Says in one sentence what is wrong with the request.
+    /// Whether the request fits a plant of these sizes.
     ///
     /// # Errors
-    /// When a size, an index or a number is out of its range.
-    pub fn check(&self, dims: Dimensions) -> Result<(), String> {
+    /// A size, an index or a number is out of its range.
+    pub fn check(&self, dims: Dimensions) -> Result<(), SpecError> {
         let r = self.tracked.len();
         if r == 0 {
-            return Err("tracked is empty: name at least one output".into());
+            return Err(SpecError::NothingTracked);
         }
         if r > dims.inputs {
-            return Err(format!(
-                "{r} tracked outputs need at least {r} inputs, but the plant has {}: track fewer outputs",
-                dims.inputs
-            ));
+            return Err(SpecError::TooFewInputs {
+                tracked: r,
+                inputs: dims.inputs,
+            });
         }
         for (at, output) in self.tracked.iter().enumerate() {
             if *output >= dims.outputs {
-                return Err(format!(
-                    "tracked names output {}, but the plant has {}",
-                    output + 1,
-                    dims.outputs
-                ));
+                return Err(SpecError::UnknownOutput {
+                    output: output + 1,
+                    outputs: dims.outputs,
+                });
             }
             if self.tracked[..at].contains(output) {
-                return Err(format!("tracked names output {} twice", output + 1));
+                return Err(SpecError::TrackedTwice(output + 1));
             }
         }
         if self.latency > 1 {
-            return Err(format!("latency is {}: give 0 or 1 samples", self.latency));
+            return Err(SpecError::Latency(self.latency));
         }
         check_decay("decay", self.decay, self.lyapunov)?;
         check_resonators(&self.resonators)?;
@@ -128,13 +210,14 @@ impl ControlSpec {
             ("input_weight", &self.input_weight, dims.inputs),
         ] {
             if weights.len() != size {
-                return Err(format!(
-                    "{name} has {} entries: give one number or {size}",
-                    weights.len()
-                ));
+                return Err(SpecError::WeightCount {
+                    weight: name,
+                    found: weights.len(),
+                    needed: size,
+                });
             }
             if weights.iter().any(|w| !w.is_finite() || *w < 0.0) {
-                return Err(format!("{name} must be finite and not negative"));
+                return Err(SpecError::Weight(name));
             }
         }
         Ok(())
@@ -146,41 +229,37 @@ impl ControlSpec {
 const CLOSEST_ANGLES: f64 = 1e-3;
 
 /// Every resonator's angle lies between 0 and pi and keeps its distance from both and from the others.
-fn check_resonators(angles: &[f64]) -> Result<(), String> {
-    let room = CLOSEST_ANGLES..=PI - CLOSEST_ANGLES;
+fn check_resonators(angles: &[f64]) -> Result<(), SpecError> {
+    let admissible = CLOSEST_ANGLES..=PI - CLOSEST_ANGLES;
     for (index, angle) in angles.iter().enumerate() {
         let harmonic = index + 1;
-        if !room.contains(angle) {
+        if !admissible.contains(angle) {
             let samples = TAU / angle;
-            return Err(format!(
-                "the internal model cannot hold harmonic {harmonic} of the disturbance, whose period is {samples:.6} samples: \
-                 choose a sample_time at which it lies between {:.4} and {:.0} samples, or use fewer harmonics or none \
-                 (internal_model = false)",
-                TAU / room.end(),
-                TAU / room.start()
-            ));
+            return Err(SpecError::Harmonic {
+                harmonic,
+                samples,
+                shortest: TAU / admissible.end(),
+                longest: TAU / admissible.start(),
+            });
         }
         let near = |other: &f64| (other - angle).abs() < CLOSEST_ANGLES;
         if angles[..index].iter().any(near) {
-            return Err(format!(
-                "resonator {harmonic} turns by {angle} radians per sample, as an earlier one does: name each frequency once"
-            ));
+            return Err(SpecError::SameFrequency {
+                resonator: harmonic,
+                angle: *angle,
+            });
         }
     }
     Ok(())
 }
 
 /// A decay rate lies in (0, 1]; strictly below 1 where a dwell time must come out of it.
-fn check_decay(name: &str, decay: f64, lyapunov: Lyapunov) -> Result<(), String> {
+fn check_decay(name: &'static str, decay: f64, lyapunov: Lyapunov) -> Result<(), SpecError> {
     if !(decay > 0.0 && decay <= 1.0) {
-        return Err(format!(
-            "{name} is {decay}: give a number above 0 and at most 1"
-        ));
+        return Err(SpecError::Decay { name, decay });
     }
     if lyapunov == Lyapunov::Dwell && decay == 1.0 {
-        return Err(format!(
-            "{name} = 1 gives no finite dwell time: give a number below 1"
-        ));
+        return Err(SpecError::NoDwellTime(name));
     }
     Ok(())
 }
@@ -228,11 +307,11 @@ impl ObserverSpec {
         }
     }
 
-    /// Says in one sentence what is wrong with the request.
+    /// Whether the request can be met by any observer.
     ///
     /// # Errors
-    /// When the decay rate is out of its range.
-    pub fn check(&self) -> Result<(), String> {
+    /// The decay rate is out of its range.
+    pub fn check(&self) -> Result<(), SpecError> {
         check_decay("the observer's decay", self.decay, self.lyapunov)
     }
 }

@@ -3,6 +3,9 @@
 use super::ControlSpec;
 use super::blocks::BlockName;
 use super::certificate::CertificateError;
+use super::request::RequestError;
+use super::spec::SpecError;
+use ftc_plant::PlantError;
 use serde::{Deserialize, Serialize};
 use std::fmt;
 
@@ -179,10 +182,11 @@ pub enum SolverFailure {
 
 /// Why there is no design.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
 pub enum DesignError {
-    /// The request itself cannot be met or is ill-formed; one sentence says why.
-    #[error("{0}")]
-    Request(String),
+    /// The request itself cannot be met or is ill-formed.
+    #[error(transparent)]
+    Request(RequestError),
     /// The inequalities conflict.
     #[error("{0}")]
     Infeasible(Infeasibility),
@@ -214,6 +218,24 @@ impl fmt::Display for Uncertified {
             "the design could not be certified: {}; {help}",
             self.reason
         )
+    }
+}
+
+impl From<RequestError> for DesignError {
+    fn from(error: RequestError) -> Self {
+        Self::Request(error)
+    }
+}
+
+impl From<PlantError> for DesignError {
+    fn from(error: PlantError) -> Self {
+        Self::Request(error.into())
+    }
+}
+
+impl From<SpecError> for DesignError {
+    fn from(error: SpecError) -> Self {
+        Self::Request(error.into())
     }
 }
 

@@ -85,19 +85,44 @@ impl Told {
 /// The longest delay of the sensors in samples.
 pub const LONGEST_DELAY: usize = 1000;
 
+/// Why a deviation does not fit a plant.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum DeviationError {
+    /// Not one gain for each input.
+    #[error("the true plant has {found} input gains, but the plant has {needed} inputs")]
+    InputGains {
+        /// Gains found.
+        found: usize,
+        /// Inputs of the plant.
+        needed: usize,
+    },
+    /// A load acts on what does not exist.
+    #[error("a load acts on {0}, which the plant does not have")]
+    Load(Port),
+    /// An actuator fault names an input that does not exist.
+    #[error("an actuator fault names an input that the plant does not have")]
+    ActuatorFault,
+    /// The mode that is reported does not exist.
+    #[error("a mode is told that the plant does not have")]
+    ReportedMode,
+    /// The readings are too late (samples).
+    #[error("the sensors are {0} samples late: give at most {LONGEST_DELAY}")]
+    SensorDelay(usize),
+}
+
 impl Deviation {
-    /// Whether every index and size fits a plant of `modes` modes.
+    /// Whether every index and size fits this plant.
     ///
     /// # Errors
-    /// One sentence that says what does not fit.
-    pub fn check(&self, plant: &SwitchedPlant) -> Result<(), String> {
+    /// What does not fit.
+    pub fn check(&self, plant: &SwitchedPlant) -> Result<(), DeviationError> {
         let dims = plant.dimensions();
         if !self.input_gain.is_empty() && self.input_gain.len() != dims.inputs {
-            return Err(format!(
-                "the true plant has {} input gains, but the plant has {} inputs",
-                self.input_gain.len(),
-                dims.inputs
-            ));
+            return Err(DeviationError::InputGains {
+                found: self.input_gain.len(),
+                needed: dims.inputs,
+            });
         }
         let misplaced = self.loads.iter().find(|load| match load.at {
             Port::Input(at) => at >= dims.inputs,
@@ -105,26 +130,17 @@ impl Deviation {
             Port::State(at) => at >= dims.states,
         });
         if let Some(load) = misplaced {
-            return Err(format!(
-                "a load acts on {}, which the plant does not have",
-                load.at
-            ));
+            return Err(DeviationError::Load(load.at));
         }
-        if self
-            .actuator_faults
-            .iter()
-            .any(|fault| fault.sensor >= dims.inputs)
-        {
-            return Err("an actuator fault names an input that the plant does not have".into());
+        let mut faults = self.actuator_faults.iter();
+        if faults.any(|fault| fault.sensor >= dims.inputs) {
+            return Err(DeviationError::ActuatorFault);
         }
         if self.told.iter().any(|told| told.mode >= plant.modes.len()) {
-            return Err("a mode is told that the plant does not have".into());
+            return Err(DeviationError::ReportedMode);
         }
         if self.sensor_delay > LONGEST_DELAY {
-            return Err(format!(
-                "the sensors are {} samples late: give at most {LONGEST_DELAY}",
-                self.sensor_delay
-            ));
+            return Err(DeviationError::SensorDelay(self.sensor_delay));
         }
         Ok(())
     }
@@ -212,8 +228,9 @@ mod tests {
             ..Deviation::default()
         };
         assert!(load(Port::State(1)).check(&plant()).is_ok());
-        let message = load(Port::State(2)).check(&plant()).unwrap_err();
-        assert!(message.contains("state 3"), "{message}");
+        let error = load(Port::State(2)).check(&plant()).unwrap_err();
+        assert_eq!(error, DeviationError::Load(Port::State(2)));
+        assert!(error.to_string().contains("state 3"), "{error}");
         assert!(load(Port::Input(1)).check(&plant()).is_err());
         assert!(load(Port::Disturbance(1)).check(&plant()).is_err());
         let gains = Deviation {

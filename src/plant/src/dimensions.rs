@@ -1,6 +1,7 @@
 //! The sizes of a plant, and the check that every matrix has them.
 
-use super::SwitchedPlant;
+use super::error::PlantError;
+use super::{Mode, OperatingPoint, SwitchedPlant};
 
 /// Numbers of states `n`, inputs `m`, outputs `p` and disturbances `s`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -16,78 +17,97 @@ pub struct Dimensions {
 }
 
 impl Dimensions {
-    /// Says in one sentence which matrix of which mode has a wrong size or a non-finite entry.
-    pub fn check(plant: &SwitchedPlant) -> Result<Self, String> {
+    /// The sizes of a plant whose matrices all fit.
+    ///
+    /// # Errors
+    /// The first matrix of a wrong size or with an entry that is not finite.
+    pub fn check(plant: &SwitchedPlant) -> Result<Self, PlantError> {
         if plant.modes.is_empty() {
-            return Err("the plant has no [[mode]]: give at least one".into());
+            return Err(PlantError::NoMode);
         }
         if !(plant.sample_time.is_finite() && plant.sample_time > 0.0) {
-            return Err(format!(
-                "sample_time is {}: give a positive number of seconds",
-                plant.sample_time
-            ));
+            return Err(PlantError::SampleTime(plant.sample_time));
         }
         let dims = plant.dimensions();
+        for (what, size) in [
+            ("states (rows of A)", dims.states),
+            ("inputs (columns of B)", dims.inputs),
+            ("outputs (rows of C)", dims.outputs),
+        ] {
+            if size == 0 {
+                return Err(PlantError::Empty(what));
+            }
+        }
+        for (index, mode) in plant.modes.iter().enumerate() {
+            dims.check_matrices(index, mode)?;
+            dims.check_operating_point(index, &mode.operating_point)?;
+        }
+        Ok(dims)
+    }
+
+    fn check_matrices(self, index: usize, mode: &Mode) -> Result<(), PlantError> {
         let Self {
             states: n,
             inputs: m,
             outputs: p,
             disturbances: s,
-        } = dims;
-        for (what, size) in [
-            ("states (rows of A)", n),
-            ("inputs (columns of B)", m),
-            ("outputs (rows of C)", p),
+        } = self;
+        for (name, matrix, needed) in [
+            ("A", &mode.a, (n, n)),
+            ("B", &mode.b, (n, m)),
+            ("C", &mode.c, (p, n)),
+            ("E", &mode.e, (n, s)),
+            ("F", &mode.f, (p, s)),
         ] {
-            if size == 0 {
-                return Err(format!("mode 1 has no {what}: give at least one"));
+            let found = matrix.shape();
+            if found != needed {
+                return Err(match index {
+                    0 => PlantError::Shape {
+                        matrix: name,
+                        found,
+                        needed,
+                        states: n,
+                    },
+                    _ => PlantError::OtherShape {
+                        mode: index + 1,
+                        matrix: name,
+                        found,
+                        needed,
+                    },
+                });
+            }
+            if let Some(at) = matrix.iter().position(|value| !value.is_finite()) {
+                return Err(PlantError::NotFinite {
+                    mode: index + 1,
+                    matrix: name,
+                    row: at % needed.0 + 1,
+                    column: at / needed.0 + 1,
+                });
             }
         }
-        for (index, mode) in plant.modes.iter().enumerate() {
-            let number = index + 1;
-            let matrices = [
-                ("A", &mode.a, (n, n)),
-                ("B", &mode.b, (n, m)),
-                ("C", &mode.c, (p, n)),
-                ("E", &mode.e, (n, s)),
-                ("F", &mode.f, (p, s)),
-            ];
-            for (name, matrix, (rows, columns)) in matrices {
-                if matrix.shape() != (rows, columns) {
-                    let reason = match index {
-                        0 => format!("with A of {n} x {n} it has to be"),
-                        _ => "mode 1 makes it".into(),
-                    };
-                    return Err(format!(
-                        "mode {number}: {name} is {} x {}, but {reason} {rows} x {columns}",
-                        matrix.nrows(),
-                        matrix.ncols()
-                    ));
-                }
-                if let Some(at) = matrix.iter().position(|value| !value.is_finite()) {
-                    return Err(format!(
-                        "mode {number}: {name} has a value that is not finite at row {}, column {}",
-                        at % rows + 1,
-                        at / rows + 1
-                    ));
-                }
+        Ok(())
+    }
+
+    fn check_operating_point(self, index: usize, point: &OperatingPoint) -> Result<(), PlantError> {
+        let mode = index + 1;
+        for (part, vector, needed) in [
+            ("x", &point.x, self.states),
+            ("u", &point.u, self.inputs),
+            ("y", &point.y, self.outputs),
+        ] {
+            let found = vector.len();
+            if found != needed {
+                return Err(PlantError::OperatingPointLength {
+                    mode,
+                    part,
+                    found,
+                    needed,
+                });
             }
-            let point = &mode.operating_point;
-            for (name, vector, size) in [("x", &point.x, n), ("u", &point.u, m), ("y", &point.y, p)]
-            {
-                if vector.len() != size {
-                    return Err(format!(
-                        "mode {number}: operating_point.{name} has {} entries, but the plant needs {size}",
-                        vector.len()
-                    ));
-                }
-                if vector.iter().any(|value| !value.is_finite()) {
-                    return Err(format!(
-                        "mode {number}: operating_point.{name} is not finite"
-                    ));
-                }
+            if vector.iter().any(|value| !value.is_finite()) {
+                return Err(PlantError::OperatingPointNotFinite { mode, part });
             }
         }
-        Ok(dims)
+        Ok(())
     }
 }

@@ -13,6 +13,7 @@
 mod continuous;
 pub mod deviation;
 mod dimensions;
+mod error;
 pub mod noise;
 pub mod rectifier;
 pub mod rows;
@@ -22,6 +23,7 @@ mod true_plant;
 
 pub use deviation::Deviation;
 pub use dimensions::Dimensions;
+pub use error::PlantError;
 pub use scenario::Scenario;
 pub use true_plant::TruePlant;
 

@@ -155,16 +155,16 @@ impl Rectifier {
     ///
     /// # Errors
     /// The grid cannot supply the load.
-    pub fn operating_point(&self, mode: usize) -> Result<OperatingPoint, String> {
+    pub fn operating_point(&self, mode: usize) -> Result<OperatingPoint, RectifierError> {
         let power = self.dc_voltage * self.dc_voltage / self.loads[mode];
         let half = self.phase_voltage / (2.0 * self.resistance);
         let root = half * half - power / (1.5 * self.resistance);
         if root < 0.0 || root.is_nan() {
-            return Err(format!(
-                "mode {}: the grid cannot supply {power:.0} W through {} ohm: raise the load resistance",
-                mode + 1,
-                self.resistance
-            ));
+            return Err(RectifierError::Overload {
+                mode: mode + 1,
+                power,
+                resistance: self.resistance,
+            });
         }
         let i_d = half - root.sqrt();
         Ok(OperatingPoint {
@@ -179,14 +179,12 @@ impl Rectifier {
     ///
     /// # Errors
     /// The grid cannot supply a load, or the DC voltage is one that the diodes hold up.
-    pub fn linearise(&self, sample_time: f64) -> Result<SwitchedPlant, String> {
+    pub fn linearise(&self, sample_time: f64) -> Result<SwitchedPlant, RectifierError> {
         if self.dc_voltage <= self.diode_voltage() {
-            return Err(format!(
-                "dc_voltage is {} V, but the diodes hold the link at sqrt(3) times phase_voltage, {:.1} V: \
-                 give a dc_voltage above it",
-                self.dc_voltage,
-                self.diode_voltage()
-            ));
+            return Err(RectifierError::DcVoltage {
+                given: self.dc_voltage,
+                diodes: self.diode_voltage(),
+            });
         }
         let modes = (0..self.loads.len())
             .map(|mode| {
@@ -203,7 +201,7 @@ impl Rectifier {
                     operating_point: point,
                 })
             })
-            .collect::<Result<_, String>>()?;
+            .collect::<Result<_, RectifierError>>()?;
         Ok(SwitchedPlant { sample_time, modes })
     }
 
@@ -226,4 +224,33 @@ impl Rectifier {
         }
         jacobian
     }
+}
+
+/// Why a rectifier has no operating point.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum RectifierError {
+    /// The grid cannot supply the load.
+    #[error(
+        "mode {mode}: the grid cannot supply {power:.0} W through {resistance} ohm: raise the load resistance"
+    )]
+    Overload {
+        /// The mode, from 1.
+        mode: usize,
+        /// Power of the load in W.
+        power: f64,
+        /// Resistance of the coils in ohm.
+        resistance: f64,
+    },
+    /// The diodes hold the DC link above the voltage that is asked for.
+    #[error(
+        "dc_voltage is {given} V, but the diodes hold the link at sqrt(3) times phase_voltage, {diodes:.1} V: \
+         give a dc_voltage above it"
+    )]
+    DcVoltage {
+        /// Asked for, in V.
+        given: f64,
+        /// What the diodes hold, in V.
+        diodes: f64,
+    },
 }

@@ -3,15 +3,30 @@
 use nalgebra::DMatrix;
 use serde::{Deserialize, Deserializer, Serialize, Serializer, de::Error};
 
-/// Builds a matrix from its rows; the error names the first row whose length differs.
-pub fn from_rows(rows: &[Vec<f64>]) -> Result<DMatrix<f64>, String> {
+/// A matrix given by rows of different lengths.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("row {row} has {found} entries where row 1 has {needed}")]
+pub struct RaggedRows {
+    /// The first row that differs, from 1.
+    pub row: usize,
+    /// Its length.
+    pub found: usize,
+    /// The length of the first row.
+    pub needed: usize,
+}
+
+/// Builds a matrix from its rows.
+///
+/// # Errors
+/// The first row whose length differs.
+pub fn from_rows(rows: &[Vec<f64>]) -> Result<DMatrix<f64>, RaggedRows> {
     let columns = rows.first().map_or(0, Vec::len);
     if let Some(bad) = rows.iter().position(|row| row.len() != columns) {
-        return Err(format!(
-            "row {} has {} entries where row 1 has {columns}",
-            bad + 1,
-            rows[bad].len()
-        ));
+        return Err(RaggedRows {
+            row: bad + 1,
+            found: rows[bad].len(),
+            needed: columns,
+        });
     }
     Ok(DMatrix::from_fn(rows.len(), columns, |r, c| rows[r][c]))
 }

@@ -113,7 +113,7 @@ fn a_link_below_the_peak_is_no_boost_rectifier() {
         dc_voltage: 500.0,
         ..rectifier()
     };
-    let message = plant.linearise(5e-3).unwrap_err();
+    let message = plant.linearise(5e-3).unwrap_err().to_string();
     assert!(message.contains("538.7"), "{message}");
 }
 

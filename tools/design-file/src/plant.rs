@@ -42,7 +42,7 @@ impl Found {
             own.replace(&source).map_err(|what| in_mode(index, &what))?;
         }
         let plant = assembled(file, &given)?;
-        if Dimensions::check(&plant)? != Dimensions::check(&assembled(file, &self.given)?)? {
+        if sized(&plant)? != sized(&assembled(file, &self.given)?)? {
             return Err(
                 "the matrices have other sizes than those of the model: keep to them".into(),
             );
@@ -87,7 +87,7 @@ pub(crate) fn read(file: &DesignFile, folder: &Path, notes: &Notes) -> Result<Fo
         (None, false) => given_modes(file, folder)?,
     };
     let plant = assembled(file, &modes)?;
-    bearable(&plant, Dimensions::check(&plant)?)?;
+    bearable(&plant, sized(&plant)?)?;
     if file.continuous != Some(true) && plant.looks_continuous() {
         notes.add(
             "every eigenvalue of A has a negative real part, as in a stable continuous-time model, but A and B are \
@@ -104,7 +104,7 @@ fn assembled(file: &DesignFile, modes: &[Given]) -> Result<SwitchedPlant, String
         sample_time: file.sample_time,
         modes: modes.iter().map(|given| given.mode.clone()).collect(),
     };
-    Dimensions::check(&plant).map(|_| plant)
+    sized(&plant).map(|_| plant)
 }
 
 /// In samples, and without direct feedthrough.
@@ -128,7 +128,7 @@ fn named(model: &PlantModel, file: &DesignFile) -> Result<Found, String> {
         );
     }
     let plant = linearised(model, file.sample_time)?;
-    bearable(&plant, Dimensions::check(&plant)?)?;
+    bearable(&plant, sized(&plant)?)?;
     Ok(Found {
         plant,
         held_inputs: 0,
@@ -487,5 +487,15 @@ fn linearised(model: &PlantModel, sample_time: f64) -> Result<SwitchedPlant, Str
             rectifier.loads.len()
         ));
     }
-    at("plant:", rectifier.linearise(sample_time))
+    at(
+        "plant:",
+        rectifier
+            .linearise(sample_time)
+            .map_err(|error| error.to_string()),
+    )
+}
+
+/// The sizes of a plant, or which matrix of which mode does not fit.
+fn sized(plant: &SwitchedPlant) -> Result<Dimensions, String> {
+    Dimensions::check(plant).map_err(|error| error.to_string())
 }

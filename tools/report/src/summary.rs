@@ -364,9 +364,7 @@ pub fn json_of_failure(asked: &ControlSpec, failure: &Failure) -> String {
         DesignError::Uncertified(uncertified) => {
             (Value::Bool(true), Vec::new(), uncertified.advice.as_slice())
         }
-        DesignError::Request(_) | DesignError::Solver(_) => {
-            (Value::Null, Vec::new(), [].as_slice())
-        }
+        _ => (Value::Null, Vec::new(), [].as_slice()),
     };
     let advice: Vec<String> = advice.iter().map(ToString::to_string).collect();
     pretty(&json!({

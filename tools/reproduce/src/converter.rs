@@ -226,7 +226,9 @@ fn predict(
         disturbance: vec![1.0; design.scenario.disturbance.len()],
         horizon,
     };
-    let mut predictive = Predictive::new(&design.plant, &spec, plant.initial_state().mode)?;
+    let mode = plant.initial_state().mode;
+    let mut predictive =
+        Predictive::new(&design.plant, &spec, mode).map_err(|error| error.to_string())?;
     Ok(run_with(plant, &mut predictive, Variant::Predictive, false))
 }
 

@@ -1,5 +1,6 @@
 //! When an unknown input observer exists: `rank(C E) = rank(E)` and `(C, T A)` detectable.
 
+use crate::RequestError;
 use crate::augmented::scaled;
 use crate::matrices::dense;
 use crate::matrices::pseudo_inverse;
@@ -47,11 +48,11 @@ impl PerUnit<'_> {
 /// `H_ij = E_i (C_j E_i)^+` (14) in physical units, for every pair of modes.
 ///
 /// # Errors
-/// A sentence naming the modes for which `rank(C E) < rank(E)`.
+/// The modes for which `rank(C E) < rank(E)`.
 pub(super) fn decoupling(
     plant: &SwitchedPlant,
     units: &PerUnit,
-) -> Result<Vec<Vec<DMatrix<f64>>>, String> {
+) -> Result<Vec<Vec<DMatrix<f64>>>, RequestError> {
     let modes = plant.modes.iter().enumerate();
     modes
         .map(|(i, left)| {
@@ -71,22 +72,19 @@ fn check_rank(
     units: &PerUnit,
     (i, left): (usize, &Mode),
     (j, entered): (usize, &Mode),
-) -> Result<(), String> {
+) -> Result<(), RequestError> {
     let e = units.e(left);
     let seen = units.c(entered) * &e;
-    let (wanted, found) = (rank(&e), rank(&seen));
-    if wanted == found {
-        return Ok(());
+    let (wanted, seen) = (rank(&e), rank(&seen));
+    match wanted == seen {
+        true => Ok(()),
+        false => Err(RequestError::HiddenDisturbance {
+            mode: i + 1,
+            successor: j + 1,
+            seen,
+            wanted,
+        }),
     }
-    let entering = match i == j {
-        true => String::new(),
-        false => format!(" when mode {} follows", j + 1),
-    };
-    Err(format!(
-        "no unknown input observer exists for mode {}{entering}: rank(C E) = {found}, but rank(E) = {wanted}, \
-         so part of the disturbance does not show in the outputs at once; use a luenberger observer or more sensors",
-        i + 1
-    ))
 }
 
 /// Number of singular values that are not negligible.

@@ -98,9 +98,8 @@ fn check_observer_sizes(
     plant: &SwitchedPlant,
     design: &ObserverDesign,
 ) -> Result<(), CertificateError> {
-    let malformed = CertificateError::Malformed;
-    let dims = Dimensions::check(plant).map_err(malformed)?;
-    design.spec.check().map_err(malformed)?;
+    let dims = Dimensions::check(plant).map_err(CertificateError::malformed)?;
+    design.spec.check().map_err(CertificateError::malformed)?;
     let (n, p, modes) = (dims.states, dims.outputs, plant.modes.len());
     let (observer, certificate) = (&design.observer, &design.certificate);
     let fits = |gain: &Matrix| gain.shape() == (n, p);

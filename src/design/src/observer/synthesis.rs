@@ -6,6 +6,7 @@ use super::kalman::Filtered;
 use super::lost_synthesis::{self, Demand, blended, common_function};
 use super::proof::observer_growth;
 use super::{ObserverCertificate, ObserverDesign};
+use crate::RequestError;
 use crate::augmented::scaled;
 use crate::blocks::{BlockKind, BlockName};
 use crate::certificate::LyapunovMatrix;
@@ -34,8 +35,8 @@ pub fn synthesise(
     spec: &ObserverSpec,
     scaling: &Scaling,
 ) -> Result<ObserverDesign, DesignError> {
-    Dimensions::check(plant).map_err(DesignError::Request)?;
-    spec.check().map_err(DesignError::Request)?;
+    Dimensions::check(plant)?;
+    spec.check()?;
     let first = chosen(plant, spec, scaling);
     first.or_else(|error| chosen(plant, spec, &other_scaling(plant, scaling)).or(Err(error)))
 }
@@ -81,12 +82,9 @@ fn unknown_input(
     scaling: &Scaling,
 ) -> Result<ObserverDesign, DesignError> {
     let units = units(scaling);
-    let h = decoupling(plant, &units.per_unit()).map_err(DesignError::Request)?;
+    let h = decoupling(plant, &units.per_unit())?;
     if h.iter().flatten().all(|h| h.amax() == 0.0) {
-        return Err(DesignError::Request(
-            "an unknown input observer needs a disturbance on the state (E), but there is none: use luenberger or auto"
-                .into(),
-        ));
+        return Err(RequestError::NoDisturbance.into());
     }
     let mixed = plant.modes.iter().any(|mode| mode.f.amax() > 0.0);
     let note = mixed.then(|| {
@@ -172,17 +170,12 @@ impl ErrorModel {
         for (i, j) in spec.lyapunov.observer_pairs(self.outputs.len()) {
             let found = check_detectable(&self.projected[i][j], &self.outputs[i], spec.decay);
             if let Err(magnitude) = found {
-                let above = (magnitude * 1e4).ceil() / 1e4;
-                let reason = match above < 1.0 {
-                    true => format!("ask for an observer.decay above {above:.4}"),
-                    false => "use a luenberger observer (observer.kind) or more sensors".into(),
-                };
-                return Err(DesignError::Request(format!(
-                    "no observer of this kind reaches decay {} in mode {}: (C, T A) has an eigenvalue of magnitude \
-                     {magnitude:.4} that the outputs do not show; {reason}",
-                    spec.decay,
-                    i + 1
-                )));
+                return Err(RequestError::Undetectable {
+                    mode: i + 1,
+                    decay: spec.decay,
+                    magnitude,
+                }
+                .into());
             }
         }
         Ok(())
@@ -511,8 +504,8 @@ pub(crate) fn candidates(
     spec: &ObserverSpec,
     scaling: &Scaling,
 ) -> Result<Vec<Candidate>, DesignError> {
-    Dimensions::check(plant).map_err(DesignError::Request)?;
-    spec.check().map_err(DesignError::Request)?;
+    Dimensions::check(plant)?;
+    spec.check()?;
     let only =
         |found: Result<ObserverDesign, DesignError>| found.map(|o| vec![Candidate::ready(o)]);
     match spec.kind {

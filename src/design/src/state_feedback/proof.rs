@@ -186,10 +186,9 @@ pub(crate) fn provable_dwell(
 
 /// Everything [`verify`] indexes has the size it must have.
 fn check_sizes(plant: &SwitchedPlant, design: &StateFeedback) -> Result<(), CertificateError> {
-    let malformed = CertificateError::Malformed;
-    let dims = Dimensions::check(plant).map_err(malformed)?;
+    let dims = Dimensions::check(plant).map_err(CertificateError::malformed)?;
     let (spec, certificate) = (&design.spec, &design.certificate);
-    spec.check(dims).map_err(malformed)?;
+    spec.check(dims).map_err(CertificateError::malformed)?;
     let (n, m, r) = (dims.states, dims.inputs, spec.tracked.len());
     let (modes, previous) = (plant.modes.len(), spec.latency * m);
     let q = spec.integral_size();

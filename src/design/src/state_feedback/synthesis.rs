@@ -84,8 +84,8 @@ fn attempt(
     scaling: &Scaling,
     run: &Run,
 ) -> Result<StateFeedback, DesignError> {
-    let dims = Dimensions::check(plant).map_err(DesignError::Request)?;
-    spec.check(dims).map_err(DesignError::Request)?;
+    let dims = Dimensions::check(plant)?;
+    spec.check(dims)?;
     let units = Units::choose(plant, spec, scaling);
     let problem = Problem {
         plant,

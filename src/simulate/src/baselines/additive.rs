@@ -3,7 +3,7 @@
 use ftc_control::ControllerParameters;
 use ftc_control::parameters::Compensation;
 use ftc_design::assembly::feedback;
-use ftc_design::{ControlSpec, Design, DesignError, Objective, state_feedback};
+use ftc_design::{ControlSpec, Design, DesignError, Objective, RequestError, state_feedback};
 
 /// The same controller with the gains of T1 (decay only, no attenuation of the disturbance) and
 /// the additive control as printed in place of the design's compensation.
@@ -12,9 +12,10 @@ use ftc_design::{ControlSpec, Design, DesignError, Objective, state_feedback};
 /// [`DesignError::Request`] for a design that was not synthesised, else as
 /// [`state_feedback::synthesise`].
 pub fn additive(design: &Design) -> Result<ControllerParameters, DesignError> {
-    let synthesis = design.synthesis.as_ref().ok_or_else(|| {
-        DesignError::Request("the gains were not made by synthesis: design them again".into())
-    })?;
+    let synthesis = design
+        .synthesis
+        .as_ref()
+        .ok_or_else(|| DesignError::Request(RequestError::NotSynthesised))?;
     let spec = ControlSpec {
         objective: Objective::Decay,
         ..synthesis.state_feedback.spec.clone()

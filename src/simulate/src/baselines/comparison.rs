@@ -1,6 +1,6 @@
 //! The baselines of one design, in the scenario of that design.
 
-use super::predictive::{Predictive, PredictiveSpec};
+use super::predictive::{Predictive, PredictiveError, PredictiveSpec};
 use super::{additive, deadbeat_bound, response_delay};
 use crate::{PlantSimulator, Trajectory, Variant, run, run_with};
 use ftc_control::{Controller, ControllerError};
@@ -23,7 +23,7 @@ pub enum BaselineError {
     Controller(#[from] ControllerError),
     /// There is no predictive controller.
     #[error("the predictive baseline: {0}")]
-    Predictive(String),
+    Predictive(#[from] PredictiveError),
     /// The design was not synthesised, so its weights are unknown.
     #[error("the design carries no weights: design it again")]
     NoWeights,
@@ -42,8 +42,7 @@ pub fn trajectories(
     let delayed = design.controller.feedback.latency > 0;
     let spec = predictive(design, &printed)?;
     let mode = plant.initial_state().mode;
-    let mut controller = Predictive::new(&design.plant, &spec, mode)
-        .map_err(|error| BaselineError::Predictive(error.to_string()))?;
+    let mut controller = Predictive::new(&design.plant, &spec, mode)?;
     if delayed {
         controller = controller.one_sample_late();
     }
@@ -52,7 +51,7 @@ pub fn trajectories(
 }
 
 /// The predictive controller with the design's weights and limits. Its filter is told the noise
-/// and the mean power of the disturbance that the scenario plays.
+/// and the mean power of the scenario's disturbance.
 fn predictive(design: &Design, played: &Trajectory) -> Result<PredictiveSpec, BaselineError> {
     let asked = &design
         .synthesis

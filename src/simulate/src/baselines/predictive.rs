@@ -69,6 +69,37 @@ struct Planner {
     kalman: DMatrix<f64>,
 }
 
+/// Why a mode has no predictive controller.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[error("mode {mode}: {cause}")]
+pub struct PredictiveError {
+    /// The mode, from 1.
+    pub mode: usize,
+    /// Why not.
+    pub cause: PredictiveCause,
+}
+
+/// What a predictive controller lacks.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum PredictiveCause {
+    /// The solver refuses the quadratic programme.
+    #[error("the quadratic programme was refused: {0}")]
+    Programme(String),
+    /// The steady state cannot be computed.
+    #[error("the equations of the steady state cannot be inverted")]
+    SteadyState,
+    /// The Kalman filter cannot be computed.
+    #[error("the filter's innovation covariance is singular")]
+    SingularInnovation,
+    /// A Riccati recursion broke down.
+    #[error("the Riccati recursion lost definiteness")]
+    Indefinite,
+    /// A Riccati recursion does not converge.
+    #[error("the Riccati recursion does not converge: the mode cannot be stabilised")]
+    NotStabilisable,
+}
+
 /// Iterations of a Riccati recursion, and the relative change that ends it.
 const RICCATI_STEPS: usize = 20_000;
 const RICCATI_ACCURACY: f64 = 1e-13;
@@ -78,13 +109,20 @@ impl Predictive {
     ///
     /// # Errors
     /// A quadratic programme the solver refuses, or a Riccati equation without solution.
-    pub fn new(plant: &SwitchedPlant, spec: &PredictiveSpec, mode: usize) -> Result<Self, String> {
+    pub fn new(
+        plant: &SwitchedPlant,
+        spec: &PredictiveSpec,
+        mode: usize,
+    ) -> Result<Self, PredictiveError> {
         let dims = plant.dimensions();
         let modes = (0..plant.modes.len())
             .map(|index| {
-                Planner::new(plant, spec, index).map_err(|why| format!("mode {}: {why}", index + 1))
+                Planner::new(plant, spec, index).map_err(|cause| PredictiveError {
+                    mode: index + 1,
+                    cause,
+                })
             })
-            .collect::<Result<_, String>>()?;
+            .collect::<Result<_, PredictiveError>>()?;
         let point = &plant.modes[mode].operating_point;
         Ok(Self {
             plant: plant.clone(),
@@ -183,7 +221,11 @@ impl Regulator for Predictive {
 }
 
 impl Planner {
-    fn new(plant: &SwitchedPlant, spec: &PredictiveSpec, index: usize) -> Result<Self, String> {
+    fn new(
+        plant: &SwitchedPlant,
+        spec: &PredictiveSpec,
+        index: usize,
+    ) -> Result<Self, PredictiveCause> {
         let mode = &plant.modes[index];
         let m = mode.b.ncols();
         let Condensed { hessian, pull } = Condensed::new(mode, spec)?;
@@ -228,7 +270,7 @@ struct Condensed {
 }
 
 impl Condensed {
-    fn new(mode: &Mode, spec: &PredictiveSpec) -> Result<Self, String> {
+    fn new(mode: &Mode, spec: &PredictiveSpec) -> Result<Self, PredictiveCause> {
         let (a, b) = (&mode.a, &mode.b);
         let (n, m) = b.shape();
         let weighted = DMatrix::from_diagonal(&DVector::from_column_slice(&spec.output_weight))
@@ -282,7 +324,7 @@ fn programme(
     horizon: usize,
     u0: &[f64],
     limits: &[Limits],
-) -> Result<DefaultSolver<f64>, String> {
+) -> Result<DefaultSolver<f64>, PredictiveCause> {
     let size = hessian.nrows();
     let m = u0.len();
     let (mut rows, mut bounds) = (Vec::new(), Vec::new());
@@ -321,7 +363,7 @@ fn programme(
         &cones,
         settings,
     )
-    .map_err(|why| format!("the quadratic programme was refused: {why}"))
+    .map_err(|why| PredictiveCause::Programme(why.to_string()))
 }
 
 fn sparse(matrix: &DMatrix<f64>) -> CscMatrix<f64> {
@@ -344,7 +386,7 @@ fn steady_state(
     a: &DMatrix<f64>,
     b: &DMatrix<f64>,
     select: &DMatrix<f64>,
-) -> Result<DMatrix<f64>, String> {
+) -> Result<DMatrix<f64>, PredictiveCause> {
     let (n, m) = b.shape();
     let r = select.nrows();
     let mut equations = DMatrix::zeros(n + r, n + m);
@@ -353,7 +395,9 @@ fn steady_state(
         .copy_from(&(a - DMatrix::identity(n, n)));
     equations.view_mut((0, n), (n, m)).copy_from(b);
     equations.view_mut((n, 0), (r, n)).copy_from(select);
-    let inverse = equations.pseudo_inverse(1e-12).map_err(str::to_owned)?;
+    let inverse = equations
+        .pseudo_inverse(1e-12)
+        .map_err(|_| PredictiveCause::SteadyState)?;
     Ok(inverse.columns(n, r).into_owned())
 }
 
@@ -363,7 +407,7 @@ fn kalman(
     plant: &SwitchedPlant,
     index: usize,
     spec: &PredictiveSpec,
-) -> Result<DMatrix<f64>, String> {
+) -> Result<DMatrix<f64>, PredictiveCause> {
     let mode = &plant.modes[index];
     let (p, n) = mode.c.shape();
     let mut a = DMatrix::identity(n + p, n + p);
@@ -387,7 +431,7 @@ fn kalman(
     let innovation = &c * &covariance * c.transpose() + variance;
     let inverse = innovation
         .try_inverse()
-        .ok_or("the filter's innovation covariance is singular")?;
+        .ok_or(PredictiveCause::SingularInnovation)?;
     Ok(covariance * c.transpose() * inverse)
 }
 
@@ -397,12 +441,12 @@ fn riccati(
     b: &DMatrix<f64>,
     state_cost: &DMatrix<f64>,
     input_cost: &DMatrix<f64>,
-) -> Result<DMatrix<f64>, String> {
+) -> Result<DMatrix<f64>, PredictiveCause> {
     let mut value = state_cost.clone();
     for _ in 0..RICCATI_STEPS {
         let gain = (input_cost + b.transpose() * &value * b)
             .cholesky()
-            .ok_or("the Riccati recursion lost definiteness")?
+            .ok_or(PredictiveCause::Indefinite)?
             .solve(&(b.transpose() * &value * a));
         let next = state_cost + a.transpose() * &value * (a - b * gain);
         let next = 0.5 * (&next + next.transpose());
@@ -412,7 +456,7 @@ fn riccati(
             return Ok(value);
         }
     }
-    Err("the Riccati recursion does not converge: the mode cannot be stabilised".into())
+    Err(PredictiveCause::NotStabilisable)
 }
 
 #[cfg(test)]

@@ -1,0 +1,146 @@
+//! Why a request cannot be met, whatever a solver would say.
+
+use super::commissioning::CommissioningError;
+use super::controllability::Uncontrollable;
+use super::spec::SpecError;
+use ftc_plant::PlantError;
+
+/// What is wrong with a request. Modes and inputs count from 1.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum RequestError {
+    /// The plant is ill-formed.
+    #[error(transparent)]
+    Plant(#[from] PlantError),
+    /// A number that is asked for is out of its range.
+    #[error(transparent)]
+    Spec(#[from] SpecError),
+    /// The inputs cannot do what is asked.
+    #[error(transparent)]
+    Uncontrollable(#[from] Uncontrollable),
+    /// The fault estimator finds no response length.
+    #[error(transparent)]
+    Commissioning(#[from] CommissioningError),
+    /// The database of a mode gives no predictor.
+    #[error("mode {mode}: {error}")]
+    Database {
+        /// The mode.
+        mode: usize,
+        /// Why not.
+        error: CommissioningError,
+    },
+    /// The response length is out of its range.
+    #[error(
+        "the response length is {length} samples, but with {inputs} inputs it must lie between 1 and {most}: \
+         set estimator.response_length, or choose a longer sample_time"
+    )]
+    ResponseLength {
+        /// In samples.
+        length: usize,
+        /// Inputs of the plant.
+        inputs: usize,
+        /// The longest.
+        most: usize,
+    },
+    /// The log of a mode is longer than the least-squares problem can be.
+    #[error(
+        "mode {mode}: the log has {samples} samples, more than are needed: shorten it to at most {most}"
+    )]
+    LongLog {
+        /// The mode.
+        mode: usize,
+        /// Samples found.
+        samples: usize,
+        /// The most.
+        most: usize,
+    },
+    /// The log of a mode excites an input too little.
+    #[error(
+        "mode {mode}: the log excites input {input} ({name}) {lag} samples back too little (1 : {:.0e} of the strongest \
+         direction): record a run in which every input moves on its own",
+        1.0 / ratio.max(f64::MIN_POSITIVE)
+    )]
+    Excitation {
+        /// The mode.
+        mode: usize,
+        /// The input.
+        input: usize,
+        /// What it is called.
+        name: String,
+        /// How many samples back.
+        lag: usize,
+        /// The weakest direction over the strongest.
+        ratio: f64,
+    },
+    /// Bumpless transfer cannot be proved.
+    #[error(
+        "controller.bumpless = true cannot be proved for this design: set it to false, ask for another decay, or for \
+         lyapunov = \"dwell\""
+    )]
+    Bumpless,
+    /// Part of the disturbance does not show in the outputs at once.
+    #[error(
+        "no unknown input observer exists for mode {mode}{}: rank(C E) = {seen}, but rank(E) = {wanted}, \
+         so part of the disturbance does not show in the outputs at once; use a luenberger observer or more sensors",
+        entering(*mode, *successor)
+    )]
+    HiddenDisturbance {
+        /// The mode.
+        mode: usize,
+        /// The mode that follows.
+        successor: usize,
+        /// `rank(C E)`.
+        seen: usize,
+        /// `rank(E)`.
+        wanted: usize,
+    },
+    /// There is nothing to decouple.
+    #[error(
+        "an unknown input observer needs a disturbance on the state (E), but there is none: use luenberger or auto"
+    )]
+    NoDisturbance,
+    /// The outputs do not show an eigenvalue that decays too slowly.
+    #[error(
+        "no observer of this kind reaches decay {decay} in mode {mode}: (C, T A) has an eigenvalue of magnitude \
+         {magnitude:.4} that the outputs do not show; {}",
+        undetectable(*magnitude)
+    )]
+    Undetectable {
+        /// The mode.
+        mode: usize,
+        /// The decay that is asked for.
+        decay: f64,
+        /// Magnitude of the eigenvalue.
+        magnitude: f64,
+    },
+    /// A theorem as printed does not fit the plant's sizes.
+    #[error(
+        "equation {equation} as printed needs as many outputs as states, but the plant has {outputs} and {states}"
+    )]
+    Printed {
+        /// Number of the equation.
+        equation: &'static str,
+        /// Outputs of the plant.
+        outputs: usize,
+        /// States of the plant.
+        states: usize,
+    },
+    /// The design holds gains that were not made by synthesis.
+    #[error("the gains were not made by synthesis: design them again")]
+    NotSynthesised,
+}
+
+fn entering(mode: usize, successor: usize) -> String {
+    match mode == successor {
+        true => String::new(),
+        false => format!(" when mode {successor} follows"),
+    }
+}
+
+fn undetectable(magnitude: f64) -> String {
+    let above = (magnitude * 1e4).ceil() / 1e4;
+    match above < 1.0 {
+        true => format!("ask for an observer.decay above {above:.4}"),
+        false => "use a luenberger observer (observer.kind) or more sensors".into(),
+    }
+}

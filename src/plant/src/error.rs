@@ -1,0 +1,80 @@
+//! What can be wrong with a plant.
+
+/// Why a plant is refused. Modes, rows and columns count from 1.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum PlantError {
+    /// There is no mode.
+    #[error("the plant has no mode: give at least one")]
+    NoMode,
+    /// The sample time (seconds) is not positive.
+    #[error("sample_time is {0}: give a positive number of seconds")]
+    SampleTime(f64),
+    /// A size is zero.
+    #[error("mode 1 has no {0}: give at least one")]
+    Empty(&'static str),
+    /// A matrix of the first mode does not fit its `A`.
+    #[error(
+        "mode 1: {matrix} is {} x {}, but with A of {states} x {states} it has to be {} x {}",
+        found.0, found.1, needed.0, needed.1
+    )]
+    Shape {
+        /// `A`, `B`, `C`, `E` or `F`.
+        matrix: &'static str,
+        /// Rows and columns.
+        found: (usize, usize),
+        /// Rows and columns.
+        needed: (usize, usize),
+        /// Rows of `A`.
+        states: usize,
+    },
+    /// A matrix of a later mode does not have the size it has in the first.
+    #[error(
+        "mode {mode}: {matrix} is {} x {}, but mode 1 makes it {} x {}",
+        found.0, found.1, needed.0, needed.1
+    )]
+    OtherShape {
+        /// The mode.
+        mode: usize,
+        /// `A`, `B`, `C`, `E` or `F`.
+        matrix: &'static str,
+        /// Rows and columns.
+        found: (usize, usize),
+        /// Rows and columns.
+        needed: (usize, usize),
+    },
+    /// An entry is infinite or no number.
+    #[error("mode {mode}: {matrix} has a value that is not finite at row {row}, column {column}")]
+    NotFinite {
+        /// The mode.
+        mode: usize,
+        /// `A`, `B`, `C`, `E` or `F`.
+        matrix: &'static str,
+        /// The row.
+        row: usize,
+        /// The column.
+        column: usize,
+    },
+    /// A part of an operating point has the wrong length.
+    #[error(
+        "mode {mode}: operating_point.{part} has {found} entries, but the plant needs {needed}"
+    )]
+    OperatingPointLength {
+        /// The mode.
+        mode: usize,
+        /// `x`, `u` or `y`.
+        part: &'static str,
+        /// Entries found.
+        found: usize,
+        /// Entries needed.
+        needed: usize,
+    },
+    /// A part of an operating point is infinite or no number.
+    #[error("mode {mode}: operating_point.{part} is not finite")]
+    OperatingPointNotFinite {
+        /// The mode.
+        mode: usize,
+        /// `x`, `u` or `y`.
+        part: &'static str,
+    },
+}
