@@ -9,6 +9,7 @@
 //! the first also under arbitrary switching where one Lyapunov function gives it within
 //! [`TOLERANCE`] of what a measured state would.
 
+mod frequency;
 mod gain;
 mod model;
 #[cfg(feature = "solver")]
