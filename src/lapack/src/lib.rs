@@ -10,6 +10,15 @@
 //! leading dimension, `info` is 0 on success, `-i` when argument `i` is illegal and positive when
 //! the numbers do not allow a result. Nothing here panics: sizes are checked first, and input that
 //! is not finite is answered by `info`, never by a loop that does not end.
+//!
+//! ```
+//! // The Cholesky factor of [4 2; 2 5], lower triangle, column after column.
+//! let mut a = [4.0, 2.0, 2.0, 5.0];
+//! let mut info = 0;
+//! // SAFETY: the sizes are those of `a`, which nothing else uses.
+//! unsafe { ftc_lapack::dpotrf_(c"L".as_ptr(), &2, a.as_mut_ptr(), &2, &mut info) };
+//! assert_eq!((info, a[0], a[1], a[3]), (0, 2.0, 1.0, 2.0));
+//! ```
 
 mod factor;
 mod jacobi;

@@ -9,6 +9,27 @@
 //!
 //! where `(x0, u0, y0)` is the mode's operating point (zero when absent), `w` the periodic
 //! disturbance and `f` the additive sensor fault. Everything is in the user's physical units.
+//!
+//! ```
+//! use ftc_plant::{Dimensions, Mode, OperatingPoint, PlantError, SwitchedPlant};
+//! use nalgebra::dmatrix;
+//!
+//! let mode = |pole: f64| Mode {
+//!     name: format!("pole {pole}"),
+//!     a: dmatrix![pole],
+//!     b: dmatrix![0.5],
+//!     c: dmatrix![1.0],
+//!     e: dmatrix![0.1],
+//!     f: dmatrix![0.0],
+//!     operating_point: OperatingPoint::zero(1, 1, 1),
+//! };
+//! let mut plant = SwitchedPlant { sample_time: 0.1, modes: vec![mode(0.9), mode(0.8)] };
+//! assert_eq!(Dimensions::check(&plant)?.states, 1);
+//! plant.modes[1].b = dmatrix![0.5, 0.5];
+//! let error = Dimensions::check(&plant).unwrap_err();
+//! assert!(matches!(error, PlantError::OtherShape { mode: 2, matrix: "B", .. }));
+//! # Ok::<(), PlantError>(())
+//! ```
 
 mod continuous;
 pub mod deviation;
