@@ -64,6 +64,7 @@ pub mod open_loop;
 pub mod parameters;
 pub mod repetition;
 pub mod state;
+pub mod tuning;
 
 pub use controller::{Change, Compensate, Controller, ControllerState, Sample};
 pub use error::{ControllerError, SampleError};

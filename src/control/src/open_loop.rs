@@ -8,13 +8,10 @@
 
 use super::kernel;
 use super::observer::ObservedMode;
+use crate::tuning::TUNING;
 use alloc::vec;
 use alloc::vec::Vec;
 use serde::{Deserialize, Serialize};
-
-/// How many thresholds reading and model may differ: the run knows neither the disturbance nor what
-/// the model misses.
-const TOLERANCE: f64 = 4.0;
 
 /// The model's run, and the sensors it contradicts.
 #[derive(Debug, PartialEq, Serialize, Deserialize)]
@@ -75,7 +72,8 @@ impl OpenLoop {
         let sensors = held.zip(thresholds).zip(expected);
         let readings = corrected.iter_mut().zip(&mut self.contradicted);
         for ((reading, contradicted), ((held, &threshold), &modelled)) in readings.zip(sensors) {
-            *contradicted = held && (*reading - modelled).abs() > TOLERANCE * threshold;
+            *contradicted =
+                held && (*reading - modelled).abs() > TUNING.open_loop_thresholds * threshold;
             if *contradicted {
                 *reading = modelled;
             }

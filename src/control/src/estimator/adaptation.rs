@@ -17,21 +17,10 @@
 use crate::kernel;
 use crate::matrix::Matrix;
 use crate::parameters::Predictor;
+use crate::tuning::TUNING;
 use alloc::vec;
 use alloc::vec::Vec;
 use serde::{Deserialize, Serialize};
-
-/// Share of the past in the running mean of squared errors.
-const MEMORY: f64 = 0.99;
-
-/// The adapted error must be this much smaller than the database's before it is preferred.
-const ADVANTAGE: f64 = 0.98;
-
-/// Largest change of an output that is admitted, relative to the database's prediction of it.
-const ADMISSIBLE: f64 = 0.05;
-
-/// The same where the prediction is near zero, in noise deviations.
-const SIGMAS: f64 = 3.0;
 
 /// The adapted response of one mode, with `q = m j` regressors.
 #[derive(Debug, PartialEq, Serialize, Deserialize)]
@@ -97,7 +86,10 @@ impl Adaptation {
         }
         let outputs = prediction.iter().zip(y0).zip(&predictor.deviation);
         for (bound, ((value, centre), deviation)) in self.bound.iter_mut().zip(outputs) {
-            *bound = kernel::bounded(ADMISSIBLE * (value - centre).abs() + SIGMAS * deviation);
+            *bound = kernel::bounded(
+                TUNING.adaptation_change * (value - centre).abs()
+                    + TUNING.adaptation_deviations * deviation,
+            );
         }
     }
 
@@ -108,7 +100,7 @@ impl Adaptation {
         additions
             .zip(scores)
             .map(|((&addition, &bound), (&fixed, &adapted))| {
-                if adapted < ADVANTAGE * fixed {
+                if adapted < TUNING.adaptation_advantage * fixed {
                     addition.clamp(-bound, bound)
                 } else {
                     0.0
@@ -146,7 +138,9 @@ impl Adaptation {
 
 /// Takes an error into a running mean of squares.
 fn update_mean(mean: &mut f64, error: f64) {
-    *mean = kernel::bounded(MEMORY * *mean + (1.0 - MEMORY) * error * error);
+    *mean = kernel::bounded(
+        TUNING.adaptation_memory * *mean + (1.0 - TUNING.adaptation_memory) * error * error,
+    );
 }
 
 /// `(R'R)^-1`, row after row: what the database leaves open.
@@ -254,7 +248,10 @@ mod tests {
             adaptation.predict(&known, &phi, &[0.0], &[1.1]);
             adaptation.learn(&phi, &[1e-3 * f64::from(k)]);
             let added: f64 = adaptation.additions().sum();
-            assert!(added <= ADMISSIBLE * 1.1 + SIGMAS * 0.01, "{added} at {k}");
+            assert!(
+                added <= TUNING.adaptation_change * 1.1 + TUNING.adaptation_deviations * 0.01,
+                "{added} at {k}"
+            );
         }
     }
 }

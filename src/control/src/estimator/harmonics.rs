@@ -7,6 +7,7 @@
 
 use crate::kernel;
 use crate::parameters::{Harmonics, PhasorMap};
+use crate::tuning::TUNING;
 use alloc::vec;
 use alloc::vec::Vec;
 use serde::{Deserialize, Serialize};
@@ -31,12 +32,6 @@ crate::state!(HarmonicState {
     constants: [],
     counters: [samples]
 });
-
-/// Samples per coefficient before a response counts as known.
-const SAMPLES_PER_COEFFICIENT: u64 = 4;
-
-/// How far a response carried over from another mode may be wrong, relative to its size.
-const TRANSFER_ERROR: f64 = 0.1;
 
 impl HarmonicState {
     /// Nothing learned yet.
@@ -109,7 +104,7 @@ impl HarmonicState {
 
     /// Whether enough was learned to say something of another mode.
     pub fn is_known(&self) -> bool {
-        self.samples >= SAMPLES_PER_COEFFICIENT * self.regressor.len() as u64
+        self.samples >= TUNING.samples_per_coefficient * self.regressor.len() as u64
     }
 
     /// Whether a whole period has been learned from.
@@ -145,7 +140,9 @@ impl HarmonicState {
         kernel::bound(&mut self.coefficients);
         let rows = self.coefficients.chunks_exact(size).zip(deviations);
         let doubt = rows
-            .map(|(row, deviation)| TRANSFER_ERROR * libm::sqrt(kernel::dot(row, row)) / deviation)
+            .map(|(row, deviation)| {
+                TUNING.transfer_error * libm::sqrt(kernel::dot(row, row)) / deviation
+            })
             .fold(0.0, f64::max);
         kernel::copy(&mut self.covariance, &other.covariance);
         let variance = kernel::bounded(doubt * doubt);

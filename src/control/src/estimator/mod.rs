@@ -15,6 +15,7 @@ mod predictor;
 mod recovery;
 mod window;
 
+use crate::tuning::TUNING;
 pub use adaptation::Adaptation;
 use alloc::vec;
 use alloc::vec::Vec;
@@ -29,13 +30,6 @@ use super::kernel;
 use super::parameters::{Estimator, EstimatorMethod};
 use hypotheses::BankState;
 use serde::{Deserialize, Serialize};
-
-/// How many noise deviations a threshold usually is.
-const USUAL_SIGMAS: f64 = 6.0;
-
-/// Only residuals below this share of their threshold are learned from: a fault that grows out of
-/// nothing, or hides just below its threshold, must not be taken for the disturbance.
-const QUIET: f64 = 0.5;
 
 /// How far a residual can be trusted.
 #[derive(Clone, Copy, Debug)]
@@ -68,10 +62,6 @@ impl Trust {
         }
     }
 }
-
-/// Where the input lies beyond what the database spans, a prediction is trusted all the same if its
-/// deviation is below this share of what it predicts. A loop closed over a less precise one may diverge.
-const PRECISE: f64 = 0.01;
 
 /// One sample as the estimator sees it.
 #[derive(Clone, Copy, Debug)]
@@ -200,7 +190,7 @@ impl EstimatorState {
         {
             let deviations = thresholds
                 .iter()
-                .map(|t| (t / USUAL_SIGMAS).max(f64::MIN_POSITIVE));
+                .map(|t| (t / TUNING.threshold_deviations).max(f64::MIN_POSITIVE));
             entered.carry_over(left, maps, deviations);
         }
     }
@@ -356,7 +346,8 @@ impl EstimatorState {
             .zip(seen.y0)
             .zip(&predictor.deviation);
         for (judged, ((&predicted, &y0), deviation)) in self.judged.iter_mut().zip(signals) {
-            let precise = libm::sqrt(leverage) * deviation <= PRECISE * (predicted - y0).abs();
+            let precise = libm::sqrt(leverage) * deviation
+                <= TUNING.extrapolation_error * (predicted - y0).abs();
             *judged = self.hold == 0 && (spanned || precise);
         }
         let most = 1.0 + estimator.leverage_limit;
@@ -466,7 +457,8 @@ impl EstimatorState {
                 (true, Verdict::Lost) => *fault,
                 (true, _) => residual.clamp(-largest, largest),
             };
-            let quiet = trust.is_some_and(|t| residual.abs() <= QUIET * t.widening * threshold);
+            let quiet = trust
+                .is_some_and(|t| residual.abs() <= TUNING.learning_share * t.widening * threshold);
             healthy &= !*flagged && verdict == Verdict::Healthy && quiet;
         }
         healthy

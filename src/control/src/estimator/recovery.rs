@@ -9,15 +9,10 @@
 
 use crate::kernel;
 use crate::parameters::Harmonics;
+use crate::tuning::TUNING;
 use alloc::vec;
 use alloc::vec::Vec;
 use serde::{Deserialize, Serialize};
-
-/// A constant, or a root mean square of the unexplained, below this share of the threshold is none.
-const NEGLIGIBLE: f64 = 0.5;
-
-/// Initial variance of the fit: nothing is known.
-const OPEN: f64 = 1e6;
 
 /// The fit of one period, with `1 + q` regressors: a constant and the harmonics.
 #[derive(Debug, PartialEq, Serialize, Deserialize)]
@@ -73,7 +68,7 @@ impl Recovery {
         self.covariance
             .iter_mut()
             .step_by(size + 1)
-            .for_each(|v| *v = OPEN);
+            .for_each(|v| *v = TUNING.recovery_variance);
         self.unexplained.fill(0.0);
         self.accused.fill(false);
         self.samples = 0;
@@ -126,7 +121,7 @@ impl Recovery {
             .nth(sensor)?
             .split_first()?;
         let mean_square = self.unexplained.get(sensor)? / self.samples.max(1) as f64;
-        let limit = NEGLIGIBLE * threshold;
+        let limit = TUNING.recovery_share * threshold;
         let innocent = constant.abs() <= limit || !settled;
         let explained = mean_square <= limit * limit;
         (innocent && explained && *self.accused.get(sensor)?).then_some(waves)

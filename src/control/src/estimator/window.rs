@@ -9,12 +9,10 @@
 //! residual once it fills the window.
 
 use crate::kernel;
+use crate::tuning::TUNING;
 use alloc::vec;
 use alloc::vec::Vec;
 use serde::{Deserialize, Serialize};
-
-/// Directions shorter than this fraction of the longest row carry no information.
-const RANK_TOLERANCE: f64 = 1e-9;
 
 /// The last `L` regressors and outputs.
 #[derive(Debug, PartialEq, Serialize, Deserialize)]
@@ -96,7 +94,7 @@ impl SlidingWindow {
                 break;
             };
             if done == 0 {
-                floor = RANK_TOLERANCE * RANK_TOLERANCE * square;
+                floor = TUNING.window_rank * TUNING.window_rank * square;
             }
             if square <= floor {
                 break;
