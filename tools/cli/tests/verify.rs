@@ -1,6 +1,7 @@
 //! `verify` proves what an FMU promises, and notices whatever does not belong to it.
 //!
 //! promise: carried-proof
+//! promise: signed
 #![allow(missing_docs)]
 
 mod common;

@@ -7,6 +7,7 @@
 
 use crate::Error;
 use crate::archive::Contents;
+use ct_codecs::{Base64, Decoder};
 use minisign::{PublicKey, PublicKeyBox, SecretKey, SecretKeyBox, SignatureBox};
 use sha2::{Digest, Sha256};
 use std::collections::BTreeMap;
@@ -72,16 +73,13 @@ impl SigningKey {
             file: path.into(),
             what,
         };
-        let held =
-            || SecretKeyBox::from_string(&text(path)?).map_err(|error| refused(no_key(&error)));
-        let found = match (
-            held()?.into_unencrypted_secret_key(),
-            std::env::var(PASSWORD),
-        ) {
-            (Ok(key), _) => Ok(key),
-            (Err(_), Ok(password)) => held()?.into_secret_key(Some(password)),
-            (Err(_), Err(_)) if std::io::stdin().is_terminal() => held()?.into_secret_key(None),
-            (Err(error), Err(_)) => Err(error),
+        let text = text(path)?;
+        let held = SecretKeyBox::from_string(&text).map_err(|error| refused(no_key(&error)))?;
+        let found = match (unprotected(&text), std::env::var(PASSWORD)) {
+            (Some(key), _) => Ok(key),
+            (None, Ok(password)) => held.into_secret_key(Some(password)),
+            (None, Err(_)) if std::io::stdin().is_terminal() => held.into_secret_key(None),
+            (None, Err(_)) => held.into_unencrypted_secret_key(),
         };
         let key = found.map_err(|error| {
             refused(format!(
@@ -148,6 +146,15 @@ fn text(path: &Path) -> Result<String, Error> {
 
 fn no_key(error: &minisign::PError) -> String {
     format!("is no such key ({error}): name a key file of minisign")
+}
+
+/// A secret key without a password. Those of the minisign program have no checksum, which its box asks
+/// for; a damaged one cannot verify what it signs, which is tried.
+fn unprotected(text: &str) -> Option<SecretKey> {
+    let line = text.lines().nth(1)?;
+    let bytes = Base64::decode_to_vec(line.trim(), None).ok()?;
+    let key = SecretKey::from_bytes(&bytes).ok()?;
+    Some(key).filter(|key| !key.is_encrypted())
 }
 
 /// A key's number as minisign writes it.
@@ -334,6 +341,37 @@ mod tests {
                 .unwrap_err()
                 .contains("not signed")
         );
+    }
+
+    /// Made by the minisign program with `-W`, for this test alone.
+    const SECRET: &str = "untrusted comment: a key for tests\nRWQAAEIyAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAZfGWMZGuxZHTQeMz1dAeFLRZKmQJVKFEmPvY2i8R1b8kPCz80iuhrOKqhtY0lHaN9doUgI0xeuO3qa91LC4ARpGGs5yg0rnDAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAA=\n";
+    const PUBLIC: &str = "untrusted comment: a key for tests\nRWRl8ZYxka7FkeKqhtY0lHaN9doUgI0xeuO3qa91LC4ARpGGs5yg0rnD\n";
+
+    #[test]
+    fn keys_of_the_minisign_program_sign() {
+        let folder = tempfile::tempdir().unwrap();
+        let [secret, public] = ["k.key", "k.pub"].map(|name| folder.path().join(name));
+        fs::write(&secret, SECRET).unwrap();
+        fs::write(&public, PUBLIC).unwrap();
+        let sound = signed(&SigningKey::read(&secret).unwrap());
+        let key = VerifyingKey::read(&public).unwrap();
+        assert!(matches!(check(&sound, Some(&key)), Ok(Origin::Signed(_))));
+        // One digit of the secret half: it cannot sign for its public half.
+        fs::write(&secret, SECRET.replacen("GuxZHTQ", "GuxZHTR", 1)).unwrap();
+        let mut contents = Contents::new();
+        let signs = SigningKey::read(&secret).and_then(|key| key.sign("x", &mut contents));
+        assert!(signs.is_err());
+    }
+
+    #[test]
+    fn a_password_is_asked_for() {
+        let folder = tempfile::tempdir().unwrap();
+        let [secret, _] = key_files(folder.path(), "own", Some("word"));
+        // Tests have no terminal to ask on, or one that nobody answers at: only the sentence is tried.
+        if !std::io::stdin().is_terminal() {
+            let sentence = SigningKey::read(&secret).unwrap_err().to_string();
+            assert!(sentence.contains(PASSWORD), "{sentence}");
+        }
     }
 
     #[test]
