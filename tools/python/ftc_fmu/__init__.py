@@ -31,9 +31,7 @@ if TYPE_CHECKING:
 __version__ = _core.version()
 
 
-def verify(
-    path: str | PathLike[str], *, key: str | PathLike[str] | None = None, run: bool = True
-) -> dict[str, Any]:
+def verify(path: str | PathLike[str], *, key: str | PathLike[str] | None = None, run: bool = True) -> dict[str, Any]:
     """Proves again, from the numbers in an FMU alone, what it promises; nothing is solved.
 
     Args:
