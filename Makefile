@@ -106,8 +106,10 @@ $(TOOLS)/$(FUZZER):
 
 TICKS ?= 100000000
 
+# Built with the whole workspace's features, so that what the tests compiled is used again.
 soak:
-	cargo run --release --package fmu-host --example soak -- $(TICKS)
+	cargo build --release --workspace --exclude ftc-python --example soak
+	target/release/examples/soak $(TICKS)
 
 # valgrind over the C programs of tests/c on both FMUs: its memcheck on one instance and its twin,
 # its two checkers of threads on eight threads with two loops each.
