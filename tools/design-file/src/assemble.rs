@@ -4,32 +4,28 @@
 
 use crate::check;
 use crate::defaults;
+use crate::estimator::estimator;
+use crate::experiment::ScenarioContext;
 use crate::healthy_log::Logs;
 use crate::notes::Notes;
 use crate::plant;
 use crate::schema::{
-    self, CompensationMethod, DesignFile, EstimatorMethod, LyapunovKind, ObjectiveKind,
-    ObserverKind, SignalInfo,
+    self, CompensationMethod, DesignFile, LyapunovKind, ObjectiveKind, ObserverKind, SignalInfo,
 };
-use crate::signal::{Signal as SignalOverTime, Tables};
+use crate::signal::Tables;
 use crate::true_plant;
-use crate::values::{NameOrList, NumberOrList};
+use crate::values::NumberOrList;
 use ftc_control::parameters;
-use ftc_design::assembly::{DatabaseSource, EstimatorSpec, KnownDisturbance, Request, Threshold};
-use ftc_design::{ControlSpec, HypothesesSpec, Lyapunov, Objective, ObserverSpec, Signal, Signals};
+use ftc_design::assembly::{KnownDisturbance, Request};
+use ftc_design::{ControlSpec, Lyapunov, Objective, ObserverSpec, Signal, Signals};
 use ftc_plant::scaling::{Known, Scaling};
-use ftc_plant::scenario::{ModeInterval, Waveform};
-use ftc_plant::{Dimensions, OperatingPoint, Scenario, SwitchedPlant};
+use ftc_plant::{Dimensions, OperatingPoint, SwitchedPlant};
 use std::path::Path;
 
 /// The largest number of states, inputs, outputs, disturbances or modes.
 pub(crate) const LARGEST_SIZE: usize = 64;
 /// The most samples of a scenario.
-const MOST_STEPS: usize = 1_000_000;
-/// The longest debounce in samples, and the most repetitions of a reading.
-const LONGEST_DEBOUNCE: usize = 10_000;
-/// How the names of logs end.
-const LOG_ENDINGS: [&str; 4] = [".csv", ".tsv", ".txt", ".dat"];
+pub(crate) const MOST_STEPS: usize = 1_000_000;
 /// The most harmonics of a disturbance.
 const MOST_HARMONICS: usize = 50;
 
@@ -404,306 +400,11 @@ fn disturbance(file: &DesignFile, dims: Dimensions) -> Result<Option<KnownDistur
     }))
 }
 
-fn estimator(
-    given: &schema::Estimator,
-    disturbance: Option<KnownDisturbance>,
-    dims: Dimensions,
-    logs: &Logs,
-) -> Result<EstimatorSpec, String> {
-    let usual = EstimatorSpec::default();
-    let database = database(given, logs)?.unwrap_or(usual.database);
-    let method = match (given.method, &database) {
-        // Only this method reads a log.
-        (None, DatabaseSource::Recorded(_)) => parameters::EstimatorMethod::Reference,
-        (None, _) => usual.method,
-        (Some(EstimatorMethod::Observer), _) => parameters::EstimatorMethod::Observer,
-        (Some(EstimatorMethod::Reference), _) => parameters::EstimatorMethod::Reference,
-        (Some(EstimatorMethod::Sliding), _) => parameters::EstimatorMethod::Sliding,
-        (Some(EstimatorMethod::None), _) => parameters::EstimatorMethod::None,
-    };
-    let response_length = match given.response_length {
-        None => None,
-        Some(length) => Some(at(
-            "estimator.response_length",
-            check::count(length, 1, ftc_design::commissioning::LONGEST_RESPONSE),
-        )?),
-    };
-    let debounce = match given.debounce {
-        None => usual.debounce,
-        Some(samples) => at(
-            "estimator.debounce",
-            check::count(samples, 1, LONGEST_DEBOUNCE),
-        )? as u32,
-    };
-    let stuck_after = match given.stuck_after {
-        None => usual.stuck_after,
-        Some(samples) => at(
-            "estimator.stuck_after",
-            check::count(samples, 0, LONGEST_DEBOUNCE),
-        )? as u32,
-    };
-    Ok(EstimatorSpec {
-        method,
-        response_length,
-        database,
-        threshold: threshold(given, dims, usual.threshold)?,
-        debounce,
-        stuck_after,
-        adapt: given.adapt.unwrap_or(usual.adapt),
-        disturbance,
-        hypotheses: hypotheses(given, dims)?,
-    })
-}
-
-fn hypotheses(given: &schema::Estimator, dims: Dimensions) -> Result<HypothesesSpec, String> {
-    let usual = HypothesesSpec::default();
-    let within = |key: &str, value: Option<f64>, usual: f64, least: f64, most: f64| match value {
-        None => Ok(usual),
-        Some(value) if (least..=most).contains(&value) => Ok(value),
-        Some(value) => Err(format!(
-            "estimator.{key} is {value}: it must lie between {least} and {most}"
-        )),
-    };
-    let sizes = |key: &str, value: &Option<NumberOrList>, count: usize| match value {
-        None => Ok(None),
-        Some(value) => {
-            let values = at(key, value.spread(count))?;
-            at(key, check::each(&values, check::positive))?;
-            Ok::<_, String>(Some(values))
-        }
-    };
-    Ok(HypothesesSpec {
-        model_error: within(
-            "model_error",
-            given.model_error,
-            usual.model_error,
-            0.0,
-            1.0,
-        )?,
-        fault_rate: within("fault_rate", given.fault_rate, usual.fault_rate, 1e-12, 0.1)?,
-        fault_length: within(
-            "fault_length",
-            given.fault_length,
-            usual.fault_length,
-            2.0,
-            1e9,
-        )?,
-        ambiguous: match given.ambiguous {
-            None => usual.ambiguous,
-            Some(schema::Ambiguous::TrustSensors) => parameters::Ambiguous::TrustSensors,
-            Some(schema::Ambiguous::TrustModel) => parameters::Ambiguous::TrustModel,
-        },
-        authority: sizes("estimator.authority", &given.authority, dims.outputs)?,
-        input_load: sizes("estimator.input_load", &given.input_load, dims.inputs)?,
-    })
-}
-
-/// The database that is named, if any is.
-fn database(given: &schema::Estimator, logs: &Logs) -> Result<Option<DatabaseSource>, String> {
-    let is_log = |name: &str| {
-        let name = name.to_lowercase();
-        LOG_ENDINGS.iter().any(|ending| name.ends_with(ending))
-    };
-    let files = match &given.database {
-        None => return Ok(None),
-        Some(NameOrList::Name(name)) if name == "commission" => {
-            return Ok(Some(DatabaseSource::Commission));
-        }
-        Some(NameOrList::Name(name)) if name == "model" => return Ok(Some(DatabaseSource::Model)),
-        Some(NameOrList::Name(name)) if !is_log(name) => {
-            return Err(format!(
-                "estimator.database = \"{}\" is not a known value and no CSV file: {}",
-                crate::sentence::shorten(name),
-                crate::suggest::nearest(name, &["commission", "model"])
-            ));
-        }
-        Some(files) => files,
-    };
-    if let NameOrList::List(names) = files
-        && let Some(name) = names.iter().find(|name| !is_log(name))
-    {
-        return Err(format!(
-            "estimator.database lists \"{}\": list CSV files only, one per mode",
-            crate::sentence::shorten(name)
-        ));
-    }
-    if !matches!(given.method, None | Some(EstimatorMethod::Reference)) {
-        return Err(
-            "estimator.database names a log, which only method = \"reference\" uses: change one of them"
-                .into(),
-        );
-    }
-    let recorded = at("estimator.database", logs.read(files))?;
-    Ok(Some(DatabaseSource::Recorded(recorded)))
-}
-
-fn threshold(
-    given: &schema::Estimator,
-    dims: Dimensions,
-    usual: Threshold,
-) -> Result<Threshold, String> {
-    match (&given.threshold, given.sigmas) {
-        (Some(_), Some(_)) => Err(
-            "estimator.threshold and estimator.sigmas exclude each other: give one of them".into(),
-        ),
-        (Some(threshold), None) => {
-            let values = at("estimator.threshold", threshold.spread(dims.outputs))?;
-            at("estimator.threshold", check::each(&values, check::positive))?;
-            Ok(Threshold::Given(values))
-        }
-        (None, None) => Ok(usual),
-        (None, Some(sigmas)) => {
-            at("estimator.sigmas", check::positive(sigmas))?;
-            Ok(Threshold::Sigmas(sigmas))
-        }
-    }
-}
-
 fn compensation(file: &DesignFile, usual: parameters::Compensation) -> parameters::Compensation {
     match file.compensation.method {
         None => usual,
         Some(CompensationMethod::VirtualSensor) => parameters::Compensation::VirtualSensor,
         Some(CompensationMethod::Additive) => parameters::Compensation::Additive,
         Some(CompensationMethod::None) => parameters::Compensation::None,
-    }
-}
-
-/// Everything the scenario depends on.
-struct ScenarioContext<'a> {
-    scenario: &'a schema::Scenario,
-    known: Option<&'a KnownDisturbance>,
-    tracked: &'a [usize],
-    signals: &'a Signals,
-    plant: &'a SwitchedPlant,
-    dims: Dimensions,
-    tables: Tables<'a>,
-}
-
-impl ScenarioContext<'_> {
-    fn resolve(&self) -> Result<Scenario, String> {
-        let given = self.scenario;
-        let steps = given.steps.map_or(Ok(defaults::STEPS), |steps| {
-            at("scenario.steps", check::count(steps, 1, MOST_STEPS)).map(|steps| steps as u64)
-        })?;
-        let seed = given.seed.map_or(Ok(defaults::SEED), |seed| {
-            u64::try_from(seed)
-                .map_err(|_| format!("scenario.seed is {seed}: give a whole number, 0 or more"))
-        })?;
-        let (outputs, disturbances) = (self.dims.outputs, self.dims.disturbances);
-        let schedule = self.schedule()?;
-        let first = schedule[0].mode;
-        Ok(Scenario {
-            steps,
-            noise: self.noise()?,
-            seed,
-            reference: self.channels("reference", &given.reference, self.tracked.len(), |at| {
-                self.step(at, first, steps)
-            })?,
-            fault: self.channels("fault", &given.fault, outputs, |_| Waveform::ZERO)?,
-            disturbance: self.channels("disturbance", &given.disturbance, disturbances, |at| {
-                self.expected_disturbance(at)
-            })?,
-            events: self.events()?,
-            schedule,
-        })
-    }
-
-    fn noise(&self) -> Result<Vec<f64>, String> {
-        let outputs = self.dims.outputs;
-        let Some(given) = &self.scenario.noise else {
-            return Ok(vec![0.0; outputs]);
-        };
-        let noise = at("scenario.noise", given.spread(outputs))?;
-        at("scenario.noise", check::each(&noise, check::not_negative))?;
-        Ok(noise)
-    }
-
-    fn schedule(&self) -> Result<Vec<ModeInterval>, String> {
-        let whole = [schema::ModeInterval { from: 0.0, mode: 1 }];
-        let given = self.scenario.schedule.as_deref().unwrap_or(&whole);
-        if given.first().is_none_or(|interval| interval.from != 0.0) {
-            return Err(
-                "scenario.schedule must start at time 0: let its first entry say from = 0".into(),
-            );
-        }
-        let ascending =
-            |pair: &[schema::ModeInterval]| pair[0].from < pair[1].from && pair[1].from.is_finite();
-        if let Some(pair) = given.windows(2).find(|pair| !ascending(pair)) {
-            return Err(format!(
-                "scenario.schedule goes from time {} to {}: give the times in ascending order",
-                pair[0].from, pair[1].from
-            ));
-        }
-        let total = self.plant.modes.len();
-        let resolve = |(entry, interval): (usize, &schema::ModeInterval)| {
-            let what = format!("scenario.schedule[{}].mode", entry + 1);
-            let mode = check::index(&what, interval.mode, total, "modes")?;
-            Ok(ModeInterval {
-                from: interval.from,
-                mode,
-            })
-        };
-        given.iter().enumerate().map(resolve).collect()
-    }
-
-    fn channels(
-        &self,
-        key: &str,
-        given: &Option<Vec<SignalOverTime>>,
-        size: usize,
-        default: impl Fn(usize) -> Waveform,
-    ) -> Result<Vec<Waveform>, String> {
-        let Some(given) = given else {
-            return Ok((0..size).map(default).collect());
-        };
-        if given.len() != size {
-            return Err(format!(
-                "scenario.{key} has {} signals: give {size}, one per channel",
-                given.len()
-            ));
-        }
-        let waveform = |(index, signal): (usize, &SignalOverTime)| {
-            signal
-                .waveform(self.tables)
-                .map_err(|what| format!("scenario.{key}[{}]: {what}", index + 1))
-        };
-        given.iter().enumerate().map(waveform).collect()
-    }
-
-    fn events(&self) -> Result<Vec<ftc_plant::scenario::FaultEvent>, String> {
-        let events = self.scenario.events.iter().flatten().enumerate();
-        events
-            .map(|(index, event)| {
-                event
-                    .fault(self.dims.outputs)
-                    .map_err(|what| format!("scenario.events[{}]: {what}", index + 1))
-            })
-            .collect()
-    }
-
-    /// A step of a tracked output from its operating point in the first mode.
-    fn step(&self, tracked: usize, first_mode: usize, steps: u64) -> Waveform {
-        let output = self.tracked[tracked];
-        let start = self.plant.modes[first_mode].operating_point.y[output];
-        let nominal = self.signals.outputs[output].nominal;
-        let height = if nominal == 1.0 { 1.0 } else { nominal / 5.0 };
-        let time = (steps / 10).max(1) as f64 * self.plant.sample_time;
-        Waveform::Steps {
-            points: vec![[0.0, start], [time, start + height]],
-        }
-    }
-
-    /// A sine of the known period and amplitude.
-    fn expected_disturbance(&self, channel: usize) -> Waveform {
-        let sine = self.known.and_then(|known| {
-            let amplitude = *known.amplitude.as_ref()?.get(channel)?;
-            Some(Waveform::Sine {
-                amplitude,
-                period: known.period,
-                phase: 0.0,
-                offset: 0.0,
-            })
-        });
-        sine.unwrap_or(Waveform::ZERO)
     }
 }

@@ -29,6 +29,8 @@ pub mod assemble;
 pub mod check;
 pub mod defaults;
 mod error;
+mod estimator;
+mod experiment;
 pub mod healthy_log;
 mod notes;
 mod plant;

@@ -1,0 +1,172 @@
+//! The fault estimator that a design file asks for.
+
+use crate::assemble::at;
+use crate::check;
+use crate::healthy_log::Logs;
+use crate::schema::{self, EstimatorMethod};
+use crate::values::{NameOrList, NumberOrList};
+use ftc_control::parameters;
+use ftc_design::HypothesesSpec;
+use ftc_design::assembly::{DatabaseSource, EstimatorSpec, KnownDisturbance, Threshold};
+use ftc_plant::Dimensions;
+
+/// The longest debounce in samples, and the most repetitions of a reading.
+const LONGEST_DEBOUNCE: usize = 10_000;
+
+/// How the names of logs end.
+const LOG_ENDINGS: [&str; 4] = [".csv", ".tsv", ".txt", ".dat"];
+
+pub(crate) fn estimator(
+    given: &schema::Estimator,
+    disturbance: Option<KnownDisturbance>,
+    dims: Dimensions,
+    logs: &Logs,
+) -> Result<EstimatorSpec, String> {
+    let usual = EstimatorSpec::default();
+    let database = database(given, logs)?.unwrap_or(usual.database);
+    let method = match (given.method, &database) {
+        // Only this method reads a log.
+        (None, DatabaseSource::Recorded(_)) => parameters::EstimatorMethod::Reference,
+        (None, _) => usual.method,
+        (Some(EstimatorMethod::Observer), _) => parameters::EstimatorMethod::Observer,
+        (Some(EstimatorMethod::Reference), _) => parameters::EstimatorMethod::Reference,
+        (Some(EstimatorMethod::Sliding), _) => parameters::EstimatorMethod::Sliding,
+        (Some(EstimatorMethod::None), _) => parameters::EstimatorMethod::None,
+    };
+    let response_length = match given.response_length {
+        None => None,
+        Some(length) => Some(at(
+            "estimator.response_length",
+            check::count(length, 1, ftc_design::commissioning::LONGEST_RESPONSE),
+        )?),
+    };
+    let debounce = match given.debounce {
+        None => usual.debounce,
+        Some(samples) => at(
+            "estimator.debounce",
+            check::count(samples, 1, LONGEST_DEBOUNCE),
+        )? as u32,
+    };
+    let stuck_after = match given.stuck_after {
+        None => usual.stuck_after,
+        Some(samples) => at(
+            "estimator.stuck_after",
+            check::count(samples, 0, LONGEST_DEBOUNCE),
+        )? as u32,
+    };
+    Ok(EstimatorSpec {
+        method,
+        response_length,
+        database,
+        threshold: threshold(given, dims, usual.threshold)?,
+        debounce,
+        stuck_after,
+        adapt: given.adapt.unwrap_or(usual.adapt),
+        disturbance,
+        hypotheses: hypotheses(given, dims)?,
+    })
+}
+
+fn hypotheses(given: &schema::Estimator, dims: Dimensions) -> Result<HypothesesSpec, String> {
+    let usual = HypothesesSpec::default();
+    let within = |key: &str, value: Option<f64>, usual: f64, least: f64, most: f64| match value {
+        None => Ok(usual),
+        Some(value) if (least..=most).contains(&value) => Ok(value),
+        Some(value) => Err(format!(
+            "estimator.{key} is {value}: it must lie between {least} and {most}"
+        )),
+    };
+    let sizes = |key: &str, value: &Option<NumberOrList>, count: usize| match value {
+        None => Ok(None),
+        Some(value) => {
+            let values = at(key, value.spread(count))?;
+            at(key, check::each(&values, check::positive))?;
+            Ok::<_, String>(Some(values))
+        }
+    };
+    Ok(HypothesesSpec {
+        model_error: within(
+            "model_error",
+            given.model_error,
+            usual.model_error,
+            0.0,
+            1.0,
+        )?,
+        fault_rate: within("fault_rate", given.fault_rate, usual.fault_rate, 1e-12, 0.1)?,
+        fault_length: within(
+            "fault_length",
+            given.fault_length,
+            usual.fault_length,
+            2.0,
+            1e9,
+        )?,
+        ambiguous: match given.ambiguous {
+            None => usual.ambiguous,
+            Some(schema::Ambiguous::TrustSensors) => parameters::Ambiguous::TrustSensors,
+            Some(schema::Ambiguous::TrustModel) => parameters::Ambiguous::TrustModel,
+        },
+        authority: sizes("estimator.authority", &given.authority, dims.outputs)?,
+        input_load: sizes("estimator.input_load", &given.input_load, dims.inputs)?,
+    })
+}
+
+/// The database that is named, if any is.
+fn database(given: &schema::Estimator, logs: &Logs) -> Result<Option<DatabaseSource>, String> {
+    let is_log = |name: &str| {
+        let name = name.to_lowercase();
+        LOG_ENDINGS.iter().any(|ending| name.ends_with(ending))
+    };
+    let files = match &given.database {
+        None => return Ok(None),
+        Some(NameOrList::Name(name)) if name == "commission" => {
+            return Ok(Some(DatabaseSource::Commission));
+        }
+        Some(NameOrList::Name(name)) if name == "model" => return Ok(Some(DatabaseSource::Model)),
+        Some(NameOrList::Name(name)) if !is_log(name) => {
+            return Err(format!(
+                "estimator.database = \"{}\" is not a known value and no CSV file: {}",
+                crate::sentence::shorten(name),
+                crate::suggest::nearest(name, &["commission", "model"])
+            ));
+        }
+        Some(files) => files,
+    };
+    if let NameOrList::List(names) = files
+        && let Some(name) = names.iter().find(|name| !is_log(name))
+    {
+        return Err(format!(
+            "estimator.database lists \"{}\": list CSV files only, one per mode",
+            crate::sentence::shorten(name)
+        ));
+    }
+    if !matches!(given.method, None | Some(EstimatorMethod::Reference)) {
+        return Err(
+            "estimator.database names a log, which only method = \"reference\" uses: change one of them"
+                .into(),
+        );
+    }
+    let recorded = at("estimator.database", logs.read(files))?;
+    Ok(Some(DatabaseSource::Recorded(recorded)))
+}
+
+fn threshold(
+    given: &schema::Estimator,
+    dims: Dimensions,
+    usual: Threshold,
+) -> Result<Threshold, String> {
+    match (&given.threshold, given.sigmas) {
+        (Some(_), Some(_)) => Err(
+            "estimator.threshold and estimator.sigmas exclude each other: give one of them".into(),
+        ),
+        (Some(threshold), None) => {
+            let values = at("estimator.threshold", threshold.spread(dims.outputs))?;
+            at("estimator.threshold", check::each(&values, check::positive))?;
+            Ok(Threshold::Given(values))
+        }
+        (None, None) => Ok(usual),
+        (None, Some(sigmas)) => {
+            at("estimator.sigmas", check::positive(sigmas))?;
+            Ok(Threshold::Sigmas(sigmas))
+        }
+    }
+}

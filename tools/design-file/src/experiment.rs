@@ -1,0 +1,151 @@
+//! The experiment that a design file asks for.
+
+use crate::assemble::{MOST_STEPS, at};
+use crate::check;
+use crate::defaults;
+use crate::schema;
+use crate::signal::{Signal as SignalOverTime, Tables};
+use ftc_design::Signals;
+use ftc_design::assembly::KnownDisturbance;
+use ftc_plant::scenario::{ModeInterval, Waveform};
+use ftc_plant::{Dimensions, Scenario, SwitchedPlant};
+
+/// Everything the scenario depends on.
+pub(crate) struct ScenarioContext<'a> {
+    pub(crate) scenario: &'a schema::Scenario,
+    pub(crate) known: Option<&'a KnownDisturbance>,
+    pub(crate) tracked: &'a [usize],
+    pub(crate) signals: &'a Signals,
+    pub(crate) plant: &'a SwitchedPlant,
+    pub(crate) dims: Dimensions,
+    pub(crate) tables: Tables<'a>,
+}
+
+impl ScenarioContext<'_> {
+    pub(crate) fn resolve(&self) -> Result<Scenario, String> {
+        let given = self.scenario;
+        let steps = given.steps.map_or(Ok(defaults::STEPS), |steps| {
+            at("scenario.steps", check::count(steps, 1, MOST_STEPS)).map(|steps| steps as u64)
+        })?;
+        let seed = given.seed.map_or(Ok(defaults::SEED), |seed| {
+            u64::try_from(seed)
+                .map_err(|_| format!("scenario.seed is {seed}: give a whole number, 0 or more"))
+        })?;
+        let (outputs, disturbances) = (self.dims.outputs, self.dims.disturbances);
+        let schedule = self.schedule()?;
+        let first = schedule[0].mode;
+        Ok(Scenario {
+            steps,
+            noise: self.noise()?,
+            seed,
+            reference: self.channels("reference", &given.reference, self.tracked.len(), |at| {
+                self.step(at, first, steps)
+            })?,
+            fault: self.channels("fault", &given.fault, outputs, |_| Waveform::ZERO)?,
+            disturbance: self.channels("disturbance", &given.disturbance, disturbances, |at| {
+                self.expected_disturbance(at)
+            })?,
+            events: self.events()?,
+            schedule,
+        })
+    }
+
+    fn noise(&self) -> Result<Vec<f64>, String> {
+        let outputs = self.dims.outputs;
+        let Some(given) = &self.scenario.noise else {
+            return Ok(vec![0.0; outputs]);
+        };
+        let noise = at("scenario.noise", given.spread(outputs))?;
+        at("scenario.noise", check::each(&noise, check::not_negative))?;
+        Ok(noise)
+    }
+
+    fn schedule(&self) -> Result<Vec<ModeInterval>, String> {
+        let whole = [schema::ModeInterval { from: 0.0, mode: 1 }];
+        let given = self.scenario.schedule.as_deref().unwrap_or(&whole);
+        if given.first().is_none_or(|interval| interval.from != 0.0) {
+            return Err(
+                "scenario.schedule must start at time 0: let its first entry say from = 0".into(),
+            );
+        }
+        let ascending =
+            |pair: &[schema::ModeInterval]| pair[0].from < pair[1].from && pair[1].from.is_finite();
+        if let Some(pair) = given.windows(2).find(|pair| !ascending(pair)) {
+            return Err(format!(
+                "scenario.schedule goes from time {} to {}: give the times in ascending order",
+                pair[0].from, pair[1].from
+            ));
+        }
+        let total = self.plant.modes.len();
+        let resolve = |(entry, interval): (usize, &schema::ModeInterval)| {
+            let what = format!("scenario.schedule[{}].mode", entry + 1);
+            let mode = check::index(&what, interval.mode, total, "modes")?;
+            Ok(ModeInterval {
+                from: interval.from,
+                mode,
+            })
+        };
+        given.iter().enumerate().map(resolve).collect()
+    }
+
+    fn channels(
+        &self,
+        key: &str,
+        given: &Option<Vec<SignalOverTime>>,
+        size: usize,
+        default: impl Fn(usize) -> Waveform,
+    ) -> Result<Vec<Waveform>, String> {
+        let Some(given) = given else {
+            return Ok((0..size).map(default).collect());
+        };
+        if given.len() != size {
+            return Err(format!(
+                "scenario.{key} has {} signals: give {size}, one per channel",
+                given.len()
+            ));
+        }
+        let waveform = |(index, signal): (usize, &SignalOverTime)| {
+            signal
+                .waveform(self.tables)
+                .map_err(|what| format!("scenario.{key}[{}]: {what}", index + 1))
+        };
+        given.iter().enumerate().map(waveform).collect()
+    }
+
+    fn events(&self) -> Result<Vec<ftc_plant::scenario::FaultEvent>, String> {
+        let events = self.scenario.events.iter().flatten().enumerate();
+        events
+            .map(|(index, event)| {
+                event
+                    .fault(self.dims.outputs)
+                    .map_err(|what| format!("scenario.events[{}]: {what}", index + 1))
+            })
+            .collect()
+    }
+
+    /// A step of a tracked output from its operating point in the first mode.
+    fn step(&self, tracked: usize, first_mode: usize, steps: u64) -> Waveform {
+        let output = self.tracked[tracked];
+        let start = self.plant.modes[first_mode].operating_point.y[output];
+        let nominal = self.signals.outputs[output].nominal;
+        let height = if nominal == 1.0 { 1.0 } else { nominal / 5.0 };
+        let time = (steps / 10).max(1) as f64 * self.plant.sample_time;
+        Waveform::Steps {
+            points: vec![[0.0, start], [time, start + height]],
+        }
+    }
+
+    /// A sine of the known period and amplitude.
+    fn expected_disturbance(&self, channel: usize) -> Waveform {
+        let sine = self.known.and_then(|known| {
+            let amplitude = *known.amplitude.as_ref()?.get(channel)?;
+            Some(Waveform::Sine {
+                amplitude,
+                period: known.period,
+                phase: 0.0,
+                offset: 0.0,
+            })
+        });
+        sine.unwrap_or(Waveform::ZERO)
+    }
+}
