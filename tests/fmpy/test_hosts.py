@@ -141,3 +141,29 @@ def test_units_are_declared_for_importers(example_case: Callable[[str], Case]) -
         structure = package.read("SystemStructure.ssd").decode()
     assert structure.count('unit="degC"') >= 10
     assert '<ssc:BaseUnit K="1" offset="273.15"/>' in structure
+
+
+@pytest.mark.parametrize(
+    ("example", "parallel", "told"),
+    [
+        ("paper", False, None),
+        ("paper", True, "one sample more of delay"),
+        ("paper_latency", True, None),
+        ("paper_latency", False, "one sample less of delay"),
+        ("tank", False, None),
+    ],
+)
+def test_a_wrong_coupling_is_noticed(
+    example_case: Callable[[str], Case],
+    capfd: pytest.CaptureFixture,
+    example: str,
+    *,
+    parallel: bool,
+    told: str | None,
+) -> None:
+    """The controller says once that the readings fit another delay, and nothing where the coupling is right."""
+    case = example_case(example)
+    fmu_loop.run(case.fmus, 900, fmu_loop.Schedule(parallel=parallel))
+    heard = capfd.readouterr().out
+    assert heard.count("of delay in the loop than the design allows for") == (told is not None)
+    assert (told or "") in heard

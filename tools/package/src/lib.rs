@@ -28,6 +28,7 @@ mod error;
 mod export;
 pub mod output;
 pub mod platform;
+mod reading;
 mod ssp;
 mod verify;
 
