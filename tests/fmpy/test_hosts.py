@@ -161,7 +161,10 @@ def test_a_wrong_coupling_is_noticed(
     parallel: bool,
     told: str | None,
 ) -> None:
-    """The controller says once that the readings fit another delay, and nothing where the coupling is right."""
+    """The controller says once that the readings fit another delay, and nothing where the coupling is right.
+
+    promise: wrong-delay
+    """
     case = example_case(example)
     fmu_loop.run(case.fmus, 900, fmu_loop.Schedule(parallel=parallel))
     heard = capfd.readouterr().out

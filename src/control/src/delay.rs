@@ -161,26 +161,49 @@ impl DelayWatch {
         let Some((designed, others)) = self.runs.split_first() else {
             return;
         };
-        let half = f64::from(self.samples) / 2.0;
-        let mut all_worse = true;
-        for (other, delay) in others.iter().zip([Delay::Longer, Delay::Shorter]) {
-            let pairs = designed.squares.iter().zip(&other.squares);
-            // The logarithm of the likelihood ratio, and the outputs that speak for and against.
-            let (mut ratio, mut most, mut least) = (0.0, 0.0_f64, 0.0_f64);
-            for ((designed, other), reading) in pairs.zip(&self.readings) {
-                let nothing = NOTHING * reading + f64::MIN_POSITIVE;
-                let of_output = libm::log((designed + nothing) / (other + nothing));
-                ratio += half * of_output;
-                (most, least) = (most.max(of_output), least.min(of_output));
+        let smaller = libm::log(SMALLER);
+        let (mut found, mut lead, mut all_worse) = (None, 0.0, true);
+        for (at, delay) in [Delay::Longer, Delay::Shorter].into_iter().enumerate() {
+            let Some(other) = others.get(at) else { break };
+            let fit = self.compare(designed, other);
+            all_worse &= -fit.ratio > CERTAIN && -fit.least > smaller;
+            if fit.ratio > lead {
+                lead = fit.ratio;
+                // It must beat the rest as clearly.
+                let mut rest = others.iter().enumerate().filter(|(index, _)| *index != at);
+                let beaten = rest.all(|(_, rest)| self.compare(rest, other).ratio > CERTAIN);
+                let clear = fit.ratio > CERTAIN && fit.most > smaller && beaten;
+                found = clear.then_some(delay);
             }
-            let smaller = libm::log(SMALLER);
-            if ratio > CERTAIN && most > smaller {
-                self.found = Some(delay);
-                self.over = true;
-                return;
-            }
-            all_worse &= -ratio > CERTAIN && -least > smaller;
         }
-        self.over = all_worse || self.samples >= MOST;
+        self.found = found;
+        self.over = self.found.is_some() || all_worse || self.samples >= MOST;
     }
+
+    /// How much better than `reference` a run fits the readings.
+    fn compare(&self, reference: &Run, run: &Run) -> Fit {
+        let half = f64::from(self.samples) / 2.0;
+        let pairs = reference.squares.iter().zip(&run.squares);
+        let mut fit = Fit {
+            ratio: 0.0,
+            most: 0.0,
+            least: 0.0,
+        };
+        for ((reference, run), reading) in pairs.zip(&self.readings) {
+            let nothing = NOTHING * reading + f64::MIN_POSITIVE;
+            let of_output = libm::log((reference + nothing) / (run + nothing));
+            fit.ratio += half * of_output;
+            fit.most = fit.most.max(of_output);
+            fit.least = fit.least.min(of_output);
+        }
+        fit
+    }
+}
+
+/// The logarithm of a likelihood ratio, and the outputs that speak most for it and against it.
+#[derive(Clone, Copy, Debug)]
+struct Fit {
+    ratio: f64,
+    most: f64,
+    least: f64,
 }

@@ -436,6 +436,8 @@ fn a_damaged_archive_is_never_taken_for_another_design() {
 }
 
 /// Archives that nobody should have to unpack, and descriptions that took minutes to read.
+///
+/// promise: bounded-reading
 #[test]
 fn archives_that_are_none_of_ours() {
     let exported = Exported::new(SOUND);

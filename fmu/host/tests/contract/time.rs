@@ -120,6 +120,8 @@ fn a_long_step_of_one_instance_is_as_many_short_ones() {
 }
 
 /// A master that steps both in parallel with a design that allows for no delay: one warning, soon.
+///
+/// promise: wrong-delay
 #[test]
 fn a_wrong_coupling_is_told_once() {
     let pair = Pair::load();
