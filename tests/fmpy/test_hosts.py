@@ -5,6 +5,7 @@ from __future__ import annotations
 import zipfile
 from typing import TYPE_CHECKING
 
+import fmpy
 import numpy as np
 import pytest
 from fmpy.ssp.simulation import simulate_ssp
@@ -80,6 +81,17 @@ def test_readings_held_within_a_coarse_step_accuse_nobody(example_case: Callable
         # A reading far from the model's may be a fault; its repetition is none.
         assert not np.any(flagged.astype(bool) & (np.abs(residual) <= threshold))
         np.testing.assert_array_equal(flagged, controller.get("fault_real"))
+
+
+def test_fmpy_simulate_accuses_no_sensor(example_case: Callable[[str], Case], capfd: pytest.CaptureFixture) -> None:
+    """`fmpy simulate` on the converter's controller: no inputs, steps of four samples, no mode told."""
+    result = fmpy.simulate_fmu(str(example_case("converter").fmus.controller))
+    flags = [name for name in result.dtype.names if name.startswith("fault")]
+    assert len(flags) == 4
+    assert not any(result[name].any() for name in flags)
+    heard = capfd.readouterr().out
+    assert heard.count("mode is 0, not told yet") == 1
+    assert heard.count("ran on these old inputs") == 1
 
 
 def test_fmpy_opens_the_package_and_closes_the_loop(example_case: Callable[[str], Case]) -> None:

@@ -16,22 +16,17 @@ import pytest
 import speed
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
     from pathlib import Path
-
-    from conftest import Case
 
 SLACK = 1.15
 
 
 @pytest.mark.skipif(shutil.which("valgrind") is None, reason="valgrind counts the instructions")
 @pytest.mark.parametrize("example", speed.EXAMPLES)
-def test_a_step_takes_no_more_instructions(tmp_path: Path, example_case: Callable[[str], Case], example: str) -> None:
+def test_a_step_takes_no_more_instructions(tmp_path: Path, example: str) -> None:
     """Controller and plant in their closed loop, by callgrind, which counts the same every time."""
     bounds = json.loads(speed.BOUNDS.read_text())
-    program = c_host.build(tmp_path, "speed")
-    for name, subject in speed.subjects(example, example_case(example).fmus, tmp_path):
-        found = subject.instructions(program)
+    for name, found in speed.counted(c_host.build(tmp_path, "speed"), example, tmp_path):
         assert found <= SLACK * bounds[name], (name, found)
         # A count that is far off tells of a step that was not taken.
         assert found >= 0.2 * bounds[name], (name, found)

@@ -59,6 +59,7 @@ mod units;
 mod verdict;
 #[cfg(feature = "solver")]
 pub mod warnings;
+pub mod work;
 
 use ftc_plant::SwitchedPlant;
 #[cfg(feature = "solver")]

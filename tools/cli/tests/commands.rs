@@ -339,6 +339,30 @@ fn a_standard_output_that_is_closed_from_the_start_is_an_error() {
     assert_eq!(unread.status.code(), Some(0));
 }
 
+/// 64 states, 32 inputs and outputs, 64 modes under one Lyapunov function: 25 GB, if anybody tried.
+#[test]
+fn what_would_exhaust_memory_is_refused_with_an_estimate() {
+    let (n, half, modes) = (64, 32, 64);
+    let matrix = |rows: usize, columns: usize, value: f64| {
+        let row = |i: usize| (0..columns).map(|j| if i == j { value } else { 0.0 }).collect();
+        let rows: Vec<Vec<f64>> = (0..rows).map(row).collect();
+        format!("{rows:?}")
+    };
+    let mode = format!(
+        "[[mode]]\nA = {}\nB = {}\nC = {}\n",
+        matrix(n, n, 0.5),
+        matrix(n, half, 1.0),
+        matrix(half, n, 1.0)
+    );
+    let text = format!("name = \"large\"\nsample_time = 1.0\n{}", mode.repeat(modes));
+    let run = Bench::new(&text).run(&["design", FILE]);
+    assert_eq!(run.code(), 2, "{}", run.stderr());
+    for word in ["GB of memory", "hours", "dwell"] {
+        assert!(run.stderr().contains(word), "{}", run.stderr());
+    }
+    assert_eq!(run.stderr().trim_end().lines().count(), 1, "{}", run.stderr());
+}
+
 #[test]
 fn export_without_binaries_says_what_to_run() {
     let bench = Bench::new(SOUND);
