@@ -24,7 +24,7 @@ use failure::Failure;
 use ftc_design::assembly::Request;
 use ftc_design::warnings::LoggedMovement;
 use ftc_design::work::Work;
-use ftc_design::{Design, DesignError, Lyapunov, Run, Solver, Step};
+use ftc_design::{Design, Lyapunov, Run, Solver, Step};
 use package::output::Staging;
 use progress::Progress;
 use report::{summary, warnings};
@@ -473,7 +473,7 @@ fn synthesised(
     request: Request,
     solver: Solver,
     progress: &Progress,
-) -> Result<Design, DesignError> {
+) -> Result<Design, ftc_design::Failure> {
     let work = Work::new(
         request.plant.dimensions(),
         request.plant.modes.len(),

@@ -344,7 +344,11 @@ fn a_standard_output_that_is_closed_from_the_start_is_an_error() {
 fn what_would_exhaust_memory_is_refused_with_an_estimate() {
     let (n, half, modes) = (64, 32, 64);
     let matrix = |rows: usize, columns: usize, value: f64| {
-        let row = |i: usize| (0..columns).map(|j| if i == j { value } else { 0.0 }).collect();
+        let row = |i: usize| {
+            (0..columns)
+                .map(|j| if i == j { value } else { 0.0 })
+                .collect()
+        };
         let rows: Vec<Vec<f64>> = (0..rows).map(row).collect();
         format!("{rows:?}")
     };
@@ -354,13 +358,21 @@ fn what_would_exhaust_memory_is_refused_with_an_estimate() {
         matrix(n, half, 1.0),
         matrix(half, n, 1.0)
     );
-    let text = format!("name = \"large\"\nsample_time = 1.0\n{}", mode.repeat(modes));
+    let text = format!(
+        "name = \"large\"\nsample_time = 1.0\n{}",
+        mode.repeat(modes)
+    );
     let run = Bench::new(&text).run(&["design", FILE]);
     assert_eq!(run.code(), 2, "{}", run.stderr());
     for word in ["GB of memory", "hours", "dwell"] {
         assert!(run.stderr().contains(word), "{}", run.stderr());
     }
-    assert_eq!(run.stderr().trim_end().lines().count(), 1, "{}", run.stderr());
+    assert_eq!(
+        run.stderr().trim_end().lines().count(),
+        1,
+        "{}",
+        run.stderr()
+    );
 }
 
 #[test]
