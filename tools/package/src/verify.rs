@@ -1,10 +1,12 @@
 //! Proves again, from the doubles an FMU ships, what it promises. Nothing is solved.
 
 use crate::Error;
+use crate::binary::{Ran, Runner};
 use crate::certificate::{self, Certificate, Promise};
-use crate::export::{KINDS, Kind};
+use crate::export::{HOST, KINDS, Kind};
 use crate::platform::PLATFORMS;
 use crate::reading;
+use crate::signature::{self, Origin, VerifyingKey};
 use ftc_design::{Design, LostSensors};
 use quick_xml::escape::unescape;
 use quick_xml::events::Event;
@@ -17,7 +19,7 @@ const DESIGN: &str = "resources/design.json";
 const DESCRIPTION: &str = "modelDescription.xml";
 
 /// Why an FMU is not verified.
-enum Refusal {
+pub(crate) enum Refusal {
     /// It cannot be read, or is none of ours.
     Unreadable(String),
     /// It does not hold what it promises.
@@ -26,26 +28,71 @@ enum Refusal {
 
 use Refusal::{Unproved, Unreadable};
 
-/// Reads an FMU and proves its certificate again.
+impl Refusal {
+    /// The same, of this file.
+    pub(crate) fn of(self, fmu: &Path) -> Error {
+        let fmu = fmu.to_path_buf();
+        match self {
+            Unreadable(what) => Error::Unreadable { fmu, what },
+            Unproved(what) => Error::Unproved { fmu, what },
+        }
+    }
+}
+
+/// What is looked at beyond the proof.
+#[derive(Default)]
+pub struct Checks {
+    /// The key that must have signed the FMU.
+    pub key: Option<VerifyingKey>,
+    /// How to run the binary for this machine; without it no code of the FMU is run.
+    pub runner: Option<Runner>,
+}
+
+/// Reads an FMU and proves its certificate again; no code of the FMU is run.
 ///
 /// # Errors
 /// [`Error::Unreadable`] for a file that is not an FMU of this program or is damaged,
 /// [`Error::Unproved`] where its parts do not agree or a promise cannot be proved.
 pub fn verify(path: &Path) -> Result<Verification, Error> {
-    let fmu = path.to_path_buf();
-    let read = reading::files(path, is_known).map_err(Unreadable);
-    let result = read.and_then(|files| Fmu { files }.verify());
-    result.map_err(|refusal| match refusal {
-        Unreadable(what) => Error::Unreadable { fmu, what },
-        Unproved(what) => Error::Unproved { fmu, what },
-    })
+    verify_with(path, &Checks::default())
+}
+
+/// [`verify`], and whatever else is asked for.
+///
+/// # Errors
+/// As [`verify`]; [`Error::Unproved`] also where the key that is given has not signed the FMU as it is,
+/// and where its binary does something else than the controller of its design.
+pub fn verify_with(path: &Path, checks: &Checks) -> Result<Verification, Error> {
+    let verified = Fmu::open(path).and_then(|fmu| {
+        let origin = signature::check(&fmu.files, checks.key.as_ref()).map_err(Unproved)?;
+        let mut found = fmu.verify(origin)?;
+        if let Some(runner) = &checks.runner {
+            found.ran = match runner.run(path)? {
+                Ran::Differs(what) => {
+                    return Err(Unproved(format!(
+                        "the binary for {HOST} {what}: it is not this design's, export it again"
+                    )));
+                }
+                ran => ran,
+            };
+        }
+        Ok(found)
+    });
+    verified.map_err(|refusal| refusal.of(path))
 }
 
 /// Whether an FMU of ours may have a file of this path; which binaries it has is looked at later.
 fn is_known(path: &str) -> bool {
     let folders = ["documentation/", "binaries/"];
-    [DESIGN, DESCRIPTION, certificate::PATH, "model.png"].contains(&path)
-        || folders.iter().any(|folder| path.starts_with(folder))
+    let files = [
+        DESIGN,
+        DESCRIPTION,
+        certificate::PATH,
+        signature::MANIFEST,
+        signature::SIGNATURE,
+        "model.png",
+    ];
+    files.contains(&path) || folders.iter().any(|folder| path.starts_with(folder))
 }
 
 /// The guid at the root of a description: the first element's, whatever follows it.
@@ -68,15 +115,36 @@ fn guid(description: &str) -> Result<Option<String>, String> {
 }
 
 /// An unpacked FMU.
-struct Fmu {
+pub(crate) struct Fmu {
     files: BTreeMap<String, Vec<u8>>,
 }
 
 impl Fmu {
-    fn verify(&self) -> Result<Verification, Refusal> {
-        let bytes = self.file(DESIGN)?;
-        let kind = self.kind(bytes)?;
-        let design: Design = parse(DESIGN, bytes)?;
+    pub(crate) fn open(path: &Path) -> Result<Self, Refusal> {
+        let files = reading::files(path, is_known).map_err(Unreadable)?;
+        Ok(Self { files })
+    }
+
+    /// The bytes of the design.
+    pub(crate) fn resource(&self) -> Result<&Vec<u8>, Refusal> {
+        self.file(DESIGN)
+    }
+
+    /// Which FMU it is, and its design.
+    pub(crate) fn design(&self) -> Result<(&'static Kind, Design), Refusal> {
+        let bytes = self.resource()?;
+        Ok((self.kind(bytes)?, parse(DESIGN, bytes)?))
+    }
+
+    /// The binary for this machine.
+    pub(crate) fn binary(&self, identifier: &str) -> Option<&Vec<u8>> {
+        let platform = PLATFORMS.iter().find(|platform| platform.name == HOST)?;
+        self.files.get(&platform.path(identifier))
+    }
+
+    fn verify(&self, origin: Origin) -> Result<Verification, Refusal> {
+        let bytes = self.resource()?;
+        let (kind, design) = self.design()?;
         design.check().map_err(Unproved)?;
         let shipped: Certificate = parse(certificate::PATH, self.file(certificate::PATH)?)?;
         ftc_design::coverage::check(&design).map_err(Unproved)?;
@@ -94,6 +162,8 @@ impl Fmu {
             design,
             certificate: shipped,
             platforms,
+            origin,
+            ran: Ran::NotRun("nobody asked for it".into()),
         })
     }
 
@@ -184,6 +254,10 @@ pub struct Verification {
     pub certificate: Certificate,
     /// Platforms for which there is a binary.
     pub platforms: Vec<&'static str>,
+    /// Who has signed it.
+    pub origin: Origin,
+    /// What came of running the binary for this machine.
+    pub ran: Ran,
 }
 
 impl fmt::Display for Verification {
@@ -253,10 +327,21 @@ impl fmt::Display for Verification {
         line(
             "binaries",
             format!(
-                "{}: of the platform, with the functions of an FMU; their machine code is not proved",
+                "{}: of the platform, with the functions of an FMU",
                 self.platforms.join(", ")
             ),
-        )
+        )?;
+        line(
+            "binary, run",
+            match &self.ran {
+                Ran::Agrees(ticks) => format!(
+                    "{HOST}: to the bit what this program's controller gives, over {ticks} ticks of random signals"
+                ),
+                Ran::NotRun(why) => format!("not run: {why}"),
+                Ran::Differs(what) => what.clone(),
+            },
+        )?;
+        line("signed", self.origin.to_string())
     }
 }
 
@@ -286,6 +371,11 @@ impl Verification {
             "observer": of(&claims.observer),
             "not_proved": ftc_design::coverage::UNCOVERED,
             "platforms": self.platforms,
+            "ran": self.ran,
+            "signed_by": match &self.origin {
+                Origin::Signed(id) => Some(id),
+                _ => None,
+            },
         })
     }
 }
