@@ -54,6 +54,7 @@ extern crate alloc;
 mod check;
 pub mod compensation;
 pub mod controller;
+pub mod delay;
 mod error;
 pub mod estimator;
 pub mod integrator;
@@ -67,6 +68,7 @@ pub mod state;
 pub mod tuning;
 
 pub use controller::{Change, Compensate, Controller, ControllerState, Sample};
+pub use delay::Delay;
 pub use error::{ControllerError, SampleError};
 pub use matrix::{Matrix, UnequalRows};
 pub use parameters::ControllerParameters;

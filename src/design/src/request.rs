@@ -3,6 +3,7 @@
 use super::commissioning::CommissioningError;
 use super::controllability::Uncontrollable;
 use super::spec::SpecError;
+use super::work::TooLarge;
 use ftc_plant::PlantError;
 
 /// What is wrong with a request. Modes and inputs count from 1.
@@ -18,6 +19,9 @@ pub enum RequestError {
     /// The inputs cannot do what is asked.
     #[error(transparent)]
     Uncontrollable(#[from] Uncontrollable),
+    /// The design would exhaust a computer.
+    #[error(transparent)]
+    TooLarge(#[from] TooLarge),
     /// The fault estimator finds no response length.
     #[error(transparent)]
     Commissioning(#[from] CommissioningError),
