@@ -73,7 +73,7 @@ pub use hypotheses::HypothesesSpec;
 pub use lyapunov::{DwellTime, Lyapunov};
 pub use matrices::{dense, mode_models, plain};
 pub use observer::{LostCertificate, ObserverCertificate, ObserverDesign};
-pub use record::{ControllerDesign, Design, FORMAT, Signal, Signals};
+pub use record::{ControllerDesign, Design, FORMAT, RecordError, Signal, Signals};
 pub use request::RequestError;
 pub use running_loop::{LostSensors, RunningLoop, SwitchingGain};
 #[cfg(feature = "solver")]

@@ -2,13 +2,14 @@
 
 use super::Synthesis;
 use super::matrices::mode_models;
-use ftc_control::ControllerParameters;
 use ftc_control::parameters::{
     Compensation, Estimator, EstimatorMethod, Limits, Observer, StateFeedback,
 };
-use ftc_plant::Dimensions;
+use ftc_control::{ControllerError, ControllerParameters};
 use ftc_plant::SwitchedPlant;
+use ftc_plant::deviation::DeviationError;
 use ftc_plant::scaling::Scaling;
+use ftc_plant::{Dimensions, PlantError};
 use ftc_plant::{Scenario, TruePlant};
 use serde::{Deserialize, Serialize};
 
@@ -94,6 +95,43 @@ pub struct Signal {
     pub max: Option<f64>,
 }
 
+/// What of a design does not fit together.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum RecordError {
+    /// Another layout than [`FORMAT`].
+    #[error("the design has layout {0}, but this program reads layout {FORMAT}: export it again")]
+    Format(u32),
+    /// The plant is ill-formed.
+    #[error(transparent)]
+    Plant(#[from] PlantError),
+    /// A list has another length than the plant needs.
+    #[error("the design has {found} {what}, but its plant needs {needed}")]
+    Count {
+        /// What is listed.
+        what: &'static str,
+        /// Entries found.
+        found: usize,
+        /// Entries needed.
+        needed: usize,
+    },
+    /// The estimator would need more memory than any design that is made here.
+    #[error("the design is not one of ours: {0}")]
+    Memory(ControllerError),
+    /// An output is tracked that does not exist; the number of outputs.
+    #[error("the design tracks an output beyond its {0}")]
+    Tracked(usize),
+    /// The schedule names a mode that does not exist; the number of modes.
+    #[error("the schedule names a mode beyond the plant's {0}")]
+    Schedule(usize),
+    /// The deviation does not fit the plant.
+    #[error(transparent)]
+    Deviation(#[from] DeviationError),
+    /// The true plant does not have the designed plant's sizes.
+    #[error("the true plant has other sizes than the designed one")]
+    TruePlant,
+}
+
 impl Design {
     /// The data of the on-line controller.
     pub fn parameters(&self) -> ControllerParameters {
@@ -112,16 +150,13 @@ impl Design {
     /// Whether every part fits the plant, so that nothing on line meets a wrong size.
     ///
     /// # Errors
-    /// One sentence that names the first part that does not fit.
-    pub fn check(&self) -> Result<(), String> {
+    /// The first part that does not fit.
+    pub fn check(&self) -> Result<(), RecordError> {
         if self.format != FORMAT {
-            return Err(format!(
-                "the design has layout {}, but this program reads layout {FORMAT}: export it again",
-                self.format
-            ));
+            return Err(RecordError::Format(self.format));
         }
         let plant = &self.plant;
-        let dims = Dimensions::check(plant).map_err(|error| error.to_string())?;
+        let dims = Dimensions::check(plant)?;
         let modes = plant.modes.len();
         let scenario = &self.scenario;
         let tracked = &self.controller.feedback.tracked;
@@ -174,35 +209,31 @@ impl Design {
             ),
         ] {
             if found != needed {
-                return Err(format!(
-                    "the design has {found} {what}, but its plant needs {needed}"
-                ));
+                return Err(RecordError::Count {
+                    what,
+                    found,
+                    needed,
+                });
             }
         }
         let memory = self.controller.estimator.check_memory(dims.inputs);
-        memory.map_err(|error| format!("the design is not one of ours: {error}"))?;
+        memory.map_err(RecordError::Memory)?;
         if tracked.iter().any(|&row| row >= dims.outputs) {
-            return Err(format!(
-                "the design tracks an output beyond its {}",
-                dims.outputs
-            ));
+            return Err(RecordError::Tracked(dims.outputs));
         }
         if scenario
             .schedule
             .iter()
             .any(|interval| interval.mode >= modes)
         {
-            return Err(format!(
-                "the schedule names a mode beyond the plant's {modes}"
-            ));
+            return Err(RecordError::Schedule(modes));
         }
         let (motion, deviation) = self.true_plant.clone().into_parts();
-        deviation.check(plant).map_err(|error| error.to_string())?;
+        deviation.check(plant)?;
         if let TruePlant::Linear { plant: truth } = &motion
-            && (Dimensions::check(truth).map_err(|error| error.to_string())? != dims
-                || truth.modes.len() != modes)
+            && (Dimensions::check(truth)? != dims || truth.modes.len() != modes)
         {
-            return Err("the true plant has other sizes than the designed one".into());
+            return Err(RecordError::TruePlant);
         }
         Ok(())
     }

@@ -145,7 +145,9 @@ impl Fmu {
     fn verify(&self, origin: Origin) -> Result<Verification, Refusal> {
         let bytes = self.resource()?;
         let (kind, design) = self.design()?;
-        design.check().map_err(Unproved)?;
+        design
+            .check()
+            .map_err(|error| Unproved(error.to_string()))?;
         let shipped: Certificate = parse(certificate::PATH, self.file(certificate::PATH)?)?;
         ftc_design::coverage::check(&design).map_err(Unproved)?;
         let expected = Certificate::of(&design, bytes)

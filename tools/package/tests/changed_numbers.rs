@@ -24,7 +24,7 @@ fn design(example: &str) -> Design {
 
 /// What `verify` asks of the numbers in an FMU.
 fn proves(design: &Design) -> Result<(), String> {
-    design.check()?;
+    design.check().map_err(|error| error.to_string())?;
     coverage::check(design)?;
     let synthesis = design.synthesis.as_ref().ok_or("no proof")?;
     let proved = synthesis.verify(&design.plant);
@@ -141,7 +141,10 @@ fn every_leaf_of(example: &str) {
             // The proofs do not read the estimator, nor what is played: they hold as before.
             let untouched = same_claims(&design, &original) && design.plant == original.plant;
             let verdict = match untouched {
-                true => design.check().and_then(|()| coverage::check(&design)),
+                true => design
+                    .check()
+                    .map_err(|error| error.to_string())
+                    .and_then(|()| coverage::check(&design)),
                 false => proves(&design),
             };
             match verdict {
