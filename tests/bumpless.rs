@@ -159,7 +159,7 @@ fn resets_more_often_than_proved_are_refused() {
 
     let mut hasty = design.clone();
     hasty.controller.feedback.transfer.as_mut().unwrap().samples = 1;
-    let sentence = ftc_design::coverage::check(&hasty).unwrap_err();
+    let sentence = ftc_design::coverage::check(&hasty).unwrap_err().to_string();
     assert!(sentence.contains("bumpless"), "{sentence}");
     let synthesis = hasty.synthesis.as_mut().unwrap();
     synthesis.running_loop.transfer.as_mut().unwrap().samples = 1;

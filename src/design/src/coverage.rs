@@ -32,15 +32,34 @@ pub const UNCOVERED: [&str; 5] = [
     "the machine code of the binaries, beyond the ticks for which the one of this machine is run",
 ];
 
+/// What of a design does not follow from what is proved.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum CoverageError {
+    /// The design was not made by synthesis.
+    #[error("resources/design.json holds no proof: export the design again")]
+    NoProof,
+    /// A part of the controller differs from what is derived of it; its name.
+    #[error("{0} of the controller does not follow from what is proved: export the design again")]
+    Differs(String),
+    /// The observer passes the disturbance on. Modes count from 1.
+    #[error(
+        "the observer does not decouple the disturbance from mode {mode} to mode {successor}: export the design again"
+    )]
+    Coupled {
+        /// The mode.
+        mode: usize,
+        /// The mode that follows.
+        successor: usize,
+    },
+}
+
 /// Derives again what can be, and checks the rest against its relations.
 ///
 /// # Errors
-/// One sentence that names the first part that does not follow.
-pub fn check(design: &Design) -> Result<(), String> {
-    let synthesis = design
-        .synthesis
-        .as_ref()
-        .ok_or("resources/design.json holds no proof: export the design again")?;
+/// The first part that does not follow.
+pub fn check(design: &Design) -> Result<(), CoverageError> {
+    let synthesis = design.synthesis.as_ref().ok_or(CoverageError::NoProof)?;
     check_feedback(design, synthesis)?;
     check_observer(design, synthesis)?;
     check_operating_points(design)?;
@@ -49,12 +68,12 @@ pub fn check(design: &Design) -> Result<(), String> {
     check_report(synthesis)
 }
 
-fn differs(what: &str) -> String {
-    format!("{what} of the controller does not follow from what is proved: export the design again")
+fn differs(what: &str) -> CoverageError {
+    CoverageError::Differs(what.into())
 }
 
 /// The first condition that fails.
-fn all(conditions: &[(bool, &str)]) -> Result<(), String> {
+fn all(conditions: &[(bool, &str)]) -> Result<(), CoverageError> {
     match conditions.iter().find(|(holds, _)| !holds) {
         Some((_, what)) => Err(differs(what)),
         None => Ok(()),
@@ -71,7 +90,7 @@ fn close(found: &Matrix, derived: &Matrix) -> bool {
             .all(|(f, d)| (f - d).abs() <= TOLERANCE * derived.amax())
 }
 
-fn check_feedback(design: &Design, synthesis: &Synthesis) -> Result<(), String> {
+fn check_feedback(design: &Design, synthesis: &Synthesis) -> Result<(), CoverageError> {
     let (running, proved) = (&design.controller.feedback, &synthesis.state_feedback);
     let plant = &design.plant;
     all(&[
@@ -104,7 +123,11 @@ fn check_feedback(design: &Design, synthesis: &Synthesis) -> Result<(), String> 
     Ok(())
 }
 
-fn check_gains(mode: usize, runs: &FeedbackGains, derived: &FeedbackGains) -> Result<(), String> {
+fn check_gains(
+    mode: usize,
+    runs: &FeedbackGains,
+    derived: &FeedbackGains,
+) -> Result<(), CoverageError> {
     let exact = [
         (
             &runs.state_feedback,
@@ -141,19 +164,26 @@ fn check_gains(mode: usize, runs: &FeedbackGains, derived: &FeedbackGains) -> Re
     }
 }
 
-fn check_observer(design: &Design, synthesis: &Synthesis) -> Result<(), String> {
+fn check_observer(design: &Design, synthesis: &Synthesis) -> Result<(), CoverageError> {
     let observer = &design.controller.observer;
     all(&[
         (*observer == synthesis.observer.observer, "the observer"),
         (lost_gains_fit(observer), "the gains for lost sensors"),
     ])?;
     match observer.kind {
-        ObserverKind::Uio => check_decoupling(&design.plant, &synthesis.observer),
+        ObserverKind::Uio => {
+            check_decoupling(&design.plant, &synthesis.observer).map_err(|[mode, successor]| {
+                CoverageError::Coupled {
+                    mode: mode + 1,
+                    successor: successor + 1,
+                }
+            })
+        }
         ObserverKind::Luenberger | ObserverKind::Kalman => Ok(()),
     }
 }
 
-fn check_operating_points(design: &Design) -> Result<(), String> {
+fn check_operating_points(design: &Design) -> Result<(), CoverageError> {
     let signals = &design.signals;
     for (mode, described) in design.plant.modes.iter().enumerate() {
         let point = &described.operating_point;
@@ -186,7 +216,7 @@ fn check_operating_points(design: &Design) -> Result<(), String> {
     Ok(())
 }
 
-fn check_limits(design: &Design) -> Result<(), String> {
+fn check_limits(design: &Design) -> Result<(), CoverageError> {
     let inputs = &design.signals.inputs;
     let outputs = &design.signals.outputs;
     let limits = design.controller.input_limits.iter().zip(inputs);
@@ -205,7 +235,7 @@ fn check_limits(design: &Design) -> Result<(), String> {
     ])
 }
 
-fn check_estimator(design: &Design) -> Result<(), String> {
+fn check_estimator(design: &Design) -> Result<(), CoverageError> {
     let estimator = &design.controller.estimator;
     let outputs = &design.signals.outputs;
     let threshold =
@@ -306,7 +336,7 @@ fn transfers_fit(design: &Design, estimator: &Estimator) -> bool {
 }
 
 /// Figures that are reported beside the claims agree with the gains.
-fn check_report(synthesis: &Synthesis) -> Result<(), String> {
+fn check_report(synthesis: &Synthesis) -> Result<(), CoverageError> {
     let control = &synthesis.state_feedback;
     let bounded = |radii: &[f64], decay: f64| {
         radii

@@ -149,7 +149,7 @@ impl Fmu {
             .check()
             .map_err(|error| Unproved(error.to_string()))?;
         let shipped: Certificate = parse(certificate::PATH, self.file(certificate::PATH)?)?;
-        ftc_design::coverage::check(&design).map_err(Unproved)?;
+        ftc_design::coverage::check(&design).map_err(|error| Unproved(error.to_string()))?;
         let expected = Certificate::of(&design, bytes)
             .ok_or_else(|| Unproved(format!("{DESIGN} holds no proof: export it again")))?;
         shipped.agree(&expected).map_err(Unproved)?;

@@ -25,7 +25,7 @@ fn design(example: &str) -> Design {
 /// What `verify` asks of the numbers in an FMU.
 fn proves(design: &Design) -> Result<(), String> {
     design.check().map_err(|error| error.to_string())?;
-    coverage::check(design)?;
+    coverage::check(design).map_err(|error| error.to_string())?;
     let synthesis = design.synthesis.as_ref().ok_or("no proof")?;
     let proved = synthesis.verify(&design.plant);
     proved.map_err(|error| error.to_string())
@@ -144,7 +144,7 @@ fn every_leaf_of(example: &str) {
                 true => design
                     .check()
                     .map_err(|error| error.to_string())
-                    .and_then(|()| coverage::check(&design)),
+                    .and_then(|()| coverage::check(&design).map_err(|error| error.to_string())),
                 false => proves(&design),
             };
             match verdict {

@@ -103,11 +103,11 @@ fn rank(matrix: &DMatrix<f64>) -> usize {
 /// Whether a state disturbance is decoupled: `(I - H_ij C_j) E_i` vanishes up to rounding.
 ///
 /// # Errors
-/// One sentence that names the modes for which it does not.
+/// The modes (from 0) for which it does not.
 pub(crate) fn check_decoupling(
     plant: &SwitchedPlant,
     design: &super::ObserverDesign,
-) -> Result<(), String> {
+) -> Result<(), [usize; 2]> {
     let units = PerUnit {
         states: &design.certificate.states,
         outputs: &design.certificate.outputs,
@@ -118,11 +118,7 @@ pub(crate) fn check_decoupling(
             let h = units.h(&dense(&design.observer.decoupling[i][j]));
             let through = &e - &h * (units.c(entered) * &e);
             if through.amax() > 1e-9 * h.amax().max(1.0) {
-                return Err(format!(
-                    "the observer does not decouple the disturbance from mode {} to mode {}: export the design again",
-                    i + 1,
-                    j + 1
-                ));
+                return Err([i, j]);
             }
         }
     }
