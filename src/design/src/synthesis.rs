@@ -91,7 +91,7 @@ pub fn synthesise_with(
             return Err(Failure {
                 error,
                 state_feedback: None,
-                observer: observer.ok(),
+                observer: observer.ok().map(Box::new),
             });
         }
     };
@@ -107,7 +107,7 @@ pub fn synthesise_with(
         Err(error @ DesignError::Request(_)) => Err(error.into()),
         Err(error) => Err(Failure {
             error,
-            state_feedback: Some(state_feedback),
+            state_feedback: Some(Box::new(state_feedback)),
             observer: None,
         }),
     }
@@ -120,9 +120,9 @@ pub struct Failure {
     /// Why there is no design.
     pub error: DesignError,
     /// The certified state feedback, if that was found.
-    pub state_feedback: Option<StateFeedback>,
+    pub state_feedback: Option<Box<StateFeedback>>,
     /// The certified observer, if that was found.
-    pub observer: Option<ObserverDesign>,
+    pub observer: Option<Box<ObserverDesign>>,
 }
 
 impl From<DesignError> for Failure {

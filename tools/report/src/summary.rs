@@ -350,7 +350,7 @@ pub fn json(design: &Design, warnings: &[String]) -> String {
 /// The same object when there is no design.
 pub fn json_of_failure(asked: &ControlSpec, failure: &Failure) -> String {
     let (control, observer) = (&failure.state_feedback, &failure.observer);
-    let (control, observer) = (control.as_ref(), observer.as_ref());
+    let (control, observer) = (control.as_deref(), observer.as_deref());
     let (feasible, blocks, advice) = match &failure.error {
         DesignError::Infeasible(infeasibility) => (
             Value::Bool(false),

@@ -15,7 +15,7 @@ pub fn additive(design: &Design) -> Result<ControllerParameters, DesignError> {
     let synthesis = design
         .synthesis
         .as_ref()
-        .ok_or_else(|| DesignError::Request(RequestError::NotSynthesised))?;
+        .ok_or(DesignError::Request(RequestError::NotSynthesised))?;
     let spec = ControlSpec {
         objective: Objective::Decay,
         ..synthesis.state_feedback.spec.clone()
