@@ -23,7 +23,8 @@ use design_file::Loaded;
 use failure::Failure;
 use ftc_design::assembly::Request;
 use ftc_design::warnings::LoggedMovement;
-use ftc_design::{Design, Run, Solver, Step};
+use ftc_design::work::Work;
+use ftc_design::{Design, Lyapunov, Run, Solver, Step};
 use package::output::Staging;
 use progress::Progress;
 use report::{summary, warnings};
@@ -201,6 +202,9 @@ impl From<SolverChoice> for Solver {
         }
     }
 }
+
+/// Seconds from which a design is said to take long before it begins.
+const LONG: f64 = 30.0;
 
 /// Exit code: done.
 const DONE: u8 = 0;
@@ -508,7 +512,20 @@ fn synthesised(
     solver: Solver,
     progress: &Progress,
 ) -> Result<Design, ftc_design::Failure> {
-    progress.tell("solving for gains and certifying them");
+    let work = Work::new(
+        request.plant.dimensions(),
+        request.plant.modes.len(),
+        &request.control,
+    );
+    // Long designs under dwell are made by Riccati equations and are sooner over.
+    let inequalities = request.control.lyapunov != Lyapunov::Dwell;
+    progress.tell(match inequalities && work.seconds > LONG {
+        true => format!(
+            "solving for gains and certifying them, about {}",
+            work.time()
+        ),
+        false => "solving for gains and certifying them".into(),
+    });
     let watch = |step: Step| match step {
         Step::Iteration { number, usual, .. } => progress.iterate(step, number, usual),
         Step::GeneralSolver => progress.tell(step.to_string()),

@@ -463,6 +463,59 @@ fn a_damaged_archive_is_never_taken_for_another_design() {
     assert!(10 * noticed > 8 * places.len(), "{noticed}");
 }
 
+/// Archives that nobody should have to unpack, and descriptions that took minutes to read.
+///
+/// promise: bounded-reading
+#[test]
+fn archives_that_are_none_of_ours() {
+    let exported = Exported::new(SOUND);
+    let bytes = fs::read(exported.bench.path("out/sound_controller.fmu")).unwrap();
+    let refused = |case: &str, bytes: &[u8], word: &str| {
+        let run = exported.verify_bytes(bytes);
+        assert_eq!(run.code(), 2, "{case}: {}", run.stderr());
+        assert!(run.stderr().contains(word), "{case}: {}", run.stderr());
+        assert_eq!(run.stderr().trim_end().lines().count(), 1, "{case}");
+    };
+    refused(
+        "junk after the end",
+        &[&bytes[..], b"junk"].concat(),
+        "damaged",
+    );
+    let mut two_names = bytes.clone();
+    two_names[30] ^= 1;
+    refused("two names", &two_names, "another name");
+    let mut fewer = bytes.clone();
+    let count = fewer.len() - 22 + 10;
+    fewer[count] -= 1;
+    refused("a count that is wrong", &fewer, "damaged");
+
+    for (name, word) in [
+        ("notes.txt", "no part"),
+        ("documentation/../../escaped", "no path inside"),
+        ("/etc/passwd", "no path inside"),
+        ("documentation\\windows", "no path inside"),
+        ("binaries/a\0b", "no path inside"),
+    ] {
+        let mut other = Exported::new(SOUND);
+        other.files.insert(name.into(), b"x".to_vec());
+        other.refused(name, 2, &[word]);
+    }
+    let mut many = Exported::new(SOUND);
+    for number in 0..70 {
+        let name = format!("documentation/{number}");
+        many.files.insert(name, Vec::new());
+    }
+    many.refused("many entries", 2, &["more than 64 entries"]);
+
+    let mut wide = Exported::new(SOUND);
+    let attributes: String = (0..60_000).map(|at| format!(" a{at}=\"\"")).collect();
+    let xml = format!("<fmiModelDescription{attributes} guid=\"none\"/>");
+    wide.files.insert(DESCRIPTION.into(), xml.into_bytes());
+    let begun = std::time::Instant::now();
+    wide.refused("many attributes", 1, &["guid"]);
+    assert!(begun.elapsed().as_secs() < 20, "{:?}", begun.elapsed());
+}
+
 /// Writes a key pair of minisign as `NAME.key` and `NAME.pub`.
 fn key_pair(bench: &Bench, name: &str) {
     let pair = minisign::KeyPair::generate_unencrypted_keypair().unwrap();

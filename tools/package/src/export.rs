@@ -56,7 +56,12 @@ pub(crate) const HOST: &str = if cfg!(target_os = "windows") {
     "linux64"
 };
 
-const LICENSES: &str = include_str!("../assets/licenses.txt");
+/// Licence texts and notices of all that the binaries link, gathered when this program is built.
+const LICENSES: &str = include_str!(concat!(env!("OUT_DIR"), "/licenses.txt"));
+
+/// The same for the standard library, as the toolchain has them.
+const STANDARD_LIBRARY: &str =
+    include_str!(concat!(env!("OUT_DIR"), "/rust-standard-library.html"));
 
 /// What every FMU shows in a browser of models.
 const ICON: &[u8] = include_bytes!("../assets/model.png");
@@ -226,6 +231,10 @@ impl Exporter<'_> {
                 self.document(kind).into_bytes(),
             ),
             ("documentation/licenses/license.txt".into(), LICENSES.into()),
+            (
+                "documentation/licenses/rust-standard-library.html".into(),
+                STANDARD_LIBRARY.into(),
+            ),
         ]);
         for binaries in self.binaries.iter().filter(|binaries| !binaries.outdated) {
             contents.insert(binaries.platform.path(&identifier), binaries.read(kind)?);

@@ -30,6 +30,7 @@ mod error;
 mod export;
 pub mod output;
 pub mod platform;
+mod reading;
 pub mod signature;
 mod ssp;
 mod verify;

@@ -5,22 +5,18 @@ use crate::binary::{Ran, Runner};
 use crate::certificate::{self, Certificate, Promise};
 use crate::export::{HOST, KINDS, Kind};
 use crate::platform::PLATFORMS;
+use crate::reading;
 use crate::signature::{self, Origin, VerifyingKey};
 use ftc_design::{Design, LostSensors};
-use roxmltree::Document;
+use quick_xml::escape::unescape;
+use quick_xml::events::Event;
 use serde_json::{Value, json};
 use std::collections::BTreeMap;
 use std::fmt;
-use std::fs::{self, File};
-use std::io::Read;
 use std::path::Path;
-use zip::ZipArchive;
 
 const DESIGN: &str = "resources/design.json";
 const DESCRIPTION: &str = "modelDescription.xml";
-
-/// No entry of an FMU of ours is larger.
-const LARGEST_ENTRY: u64 = 256 << 20;
 
 /// Why an FMU is not verified.
 pub(crate) enum Refusal {
@@ -85,47 +81,37 @@ pub fn verify_with(path: &Path, checks: &Checks) -> Result<Verification, Error> 
     verified.map_err(|refusal| refusal.of(path))
 }
 
-/// Every file of the archive; reading one checks its checksum.
-fn contents(path: &Path) -> Result<BTreeMap<String, Vec<u8>>, Refusal> {
-    let file = File::open(path)
-        .map_err(|error| Unreadable(format!("cannot be opened ({error}): name an FMU")))?;
-    if fs::metadata(path).is_ok_and(|about| about.is_dir()) {
-        return Err(Unreadable("this is a directory: name an FMU in it".into()));
-    }
-    let damaged =
-        |what: String| Unreadable(format!("the archive is damaged ({what}): export it again"));
-    let mut archive = ZipArchive::new(file).map_err(|error| match is_zip(path) {
-        true => damaged(error.to_string()),
-        false => Unreadable("this is no FMU: name one that ftc-fmu export wrote".into()),
-    })?;
-    let mut files = BTreeMap::new();
-    for index in 0..archive.len() {
-        let mut entry = archive
-            .by_index(index)
-            .map_err(|error| damaged(error.to_string()))?;
-        let name = entry
-            .name()
-            .map_err(|error| damaged(error.to_string()))?
-            .into_owned();
-        let mut bytes = Vec::new();
-        (&mut entry)
-            .take(LARGEST_ENTRY)
-            .read_to_end(&mut bytes)
-            .map_err(|error| damaged(format!("{name}: {error}")))?;
-        if bytes.len() as u64 == LARGEST_ENTRY || files.insert(name.clone(), bytes).is_some() {
-            return Err(damaged(format!("{name} is too large or stands twice")));
-        }
-    }
-    Ok(files)
+/// Whether an FMU of ours may have a file of this path; which binaries it has is looked at later.
+fn is_known(path: &str) -> bool {
+    let folders = ["documentation/", "binaries/"];
+    let files = [
+        DESIGN,
+        DESCRIPTION,
+        certificate::PATH,
+        signature::MANIFEST,
+        signature::SIGNATURE,
+        "model.png",
+    ];
+    files.contains(&path) || folders.iter().any(|folder| path.starts_with(folder))
 }
 
-/// Whether a file begins as zip archives do.
-fn is_zip(path: &Path) -> bool {
-    let mut magic = [0; 2];
-    File::open(path)
-        .and_then(|mut file| file.read_exact(&mut magic))
-        .is_ok()
-        && &magic == b"PK"
+/// The guid at the root of a description: the first element's, whatever follows it.
+fn guid(description: &str) -> Result<Option<String>, String> {
+    let mut reader = quick_xml::Reader::from_str(description);
+    loop {
+        match reader.read_event().map_err(|error| error.to_string())? {
+            Event::Start(root) | Event::Empty(root) => {
+                // Without the check for attributes that stand twice, which takes the square of their number.
+                let mut attributes = root.attributes();
+                let mut attributes = attributes.with_checks(false).flatten();
+                let guid = attributes.find(|attribute| attribute.key.as_ref() == "guid");
+                return Ok(guid
+                    .map(|attribute| unescape(&attribute.value).unwrap_or_default().into_owned()));
+            }
+            Event::Eof => return Err("there is no element in it".into()),
+            _ => {}
+        }
+    }
 }
 
 /// An unpacked FMU.
@@ -135,9 +121,8 @@ pub(crate) struct Fmu {
 
 impl Fmu {
     pub(crate) fn open(path: &Path) -> Result<Self, Refusal> {
-        Ok(Self {
-            files: contents(path)?,
-        })
+        let files = reading::files(path, is_known).map_err(Unreadable)?;
+        Ok(Self { files })
     }
 
     /// The bytes of the design.
@@ -194,10 +179,10 @@ impl Fmu {
     fn kind(&self, design: &[u8]) -> Result<&'static Kind, Refusal> {
         let text = std::str::from_utf8(self.file(DESCRIPTION)?)
             .map_err(|_| Unreadable(format!("{DESCRIPTION} is not UTF-8: export it again")))?;
-        let document = Document::parse(text)
+        let guid = guid(text)
             .map_err(|error| Unreadable(format!("{DESCRIPTION}: {error}: export it again")))?;
-        let guid = document.root_element().attribute("guid");
-        let belongs = |kind: &&Kind| guid == Some(&model_description::guid(kind.binary, design));
+        let belongs =
+            |kind: &&Kind| guid.as_ref() == Some(&model_description::guid(kind.binary, design));
         KINDS.iter().find(belongs).ok_or_else(|| {
             Unproved(format!(
                 "the guid in {DESCRIPTION} does not belong to {DESIGN}: one of them was changed, export it again"
