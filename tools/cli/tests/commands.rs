@@ -466,7 +466,10 @@ fn a_disturbance_has_the_name_and_unit_it_was_given() {
     let files = unzip(&bench.path("out/sound_plant.fmu"));
     let xml = String::from_utf8(files["modelDescription.xml"].clone()).unwrap();
     assert!(xml.contains("load torque"), "{xml}");
-    assert!(xml.contains("unit=\"N.m\" nominal=\"2.0\""), "{xml}");
+    assert!(
+        xml.contains("unit=\"N.m\" relativeQuantity=\"true\" nominal=\"2.0\""),
+        "{xml}"
+    );
     for (list, key) in [
         ("[{}, {}]", "signals.disturbances"),
         ("[{ name = \"a\\u0001\" }]", "signals.disturbances[1].name"),
