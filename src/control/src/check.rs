@@ -261,6 +261,7 @@ fn hypotheses(settings: &Hypotheses, sizes: Sizes) -> Checked {
         )?;
     }
     for (what, values, needed) in [
+        ("noise", &settings.noise, p),
         ("fault_size", &settings.fault_size, p),
         ("authority", &settings.authority, p),
         ("input_load", &settings.input_load, m),

@@ -231,6 +231,8 @@ pub struct Channels {
 pub struct Hypotheses {
     /// How the disturbance enters, per mode.
     pub channels: Vec<Channels>,
+    /// Standard deviation of the noise of each sensor (p), output units.
+    pub noise: Vec<f64>,
     /// Faults per sample and sensor.
     pub fault_rate: f64,
     /// Freezes per sample and sensor.

@@ -30,8 +30,8 @@ const SCALE_VARIANCE: f64 = 0.25;
 pub(super) enum Action {
     /// All goes on.
     Stay,
-    /// Loads and input gains jump.
-    Load,
+    /// Loads jump, and input gains with them: the number of the jump.
+    Load(usize),
     /// These sensors have a bias.
     Accuse(Sensors),
     /// This sensor's gain is wrong.
@@ -67,8 +67,8 @@ pub(super) struct Candidates {
 }
 
 impl Candidates {
-    /// For `outputs` sensors.
-    pub(super) fn new(outputs: usize) -> Self {
+    /// For `outputs` sensors and so many jumps of loads.
+    pub(super) fn new(outputs: usize, jumps: usize) -> Self {
         let none = Candidate {
             score: 0.0,
             parent: 0,
@@ -76,7 +76,7 @@ impl Candidates {
             convinced: false,
         };
         Self {
-            list: vec![none; super::SLOTS * (6 + 6 * outputs + outputs * outputs)],
+            list: vec![none; super::SLOTS * (6 + jumps + 6 * outputs + outputs * outputs)],
             count: 0,
         }
     }
@@ -130,22 +130,24 @@ impl Bank {
         });
         let unlikely = square > QUIET.min(4.0 + p as f64);
         if unlikely || moving {
-            let price = if moving {
-                self.prices.moving
-            } else {
-                self.prices.load
-            };
-            let mut value = price + self.trial(state, slot, model, reading, Action::Load);
-            if moving {
-                value = value.max(likelihood + 0.5 * square.min(1e5) - self.settings.surprise);
+            for jump in 0..model.jumps.len() {
+                let together = jump == 0;
+                let price = match (together, moving) {
+                    (true, true) => self.prices.moving,
+                    (true, false) => TOGETHER * self.prices.load,
+                    (false, _) => self.prices.load,
+                };
+                let mut value = price + self.trial(state, slot, model, reading, Action::Load(jump));
+                if moving && together {
+                    value = value.max(likelihood + 0.5 * square.min(1e5) - self.settings.surprise);
+                }
+                state.candidates.add(Candidate {
+                    score: score + value,
+                    parent: slot,
+                    action: Action::Load(jump),
+                    convinced,
+                });
             }
-            let value = score + value;
-            state.candidates.add(Candidate {
-                score: value,
-                parent: slot,
-                action: Action::Load,
-                convinced,
-            });
         }
         if state.first && accused == 0 {
             let value =
@@ -309,15 +311,16 @@ impl Bank {
         let trial = &mut state.trial;
         trial.predict(layout, model, reading, h, kinds, bias);
         match action {
-            Action::Load => {
+            Action::Load(jump) => {
+                let jump = &model.jumps[jump];
                 let variance = self.settings.gain_error * self.settings.gain_error;
                 for q in 0..p {
                     for j in 0..=q {
                         if !has(reading.valid & !stuck, q) || !has(reading.valid & !stuck, j) {
                             continue;
                         }
-                        let mut sum = model.load_seen[q * p + j];
-                        for k in 0..m {
+                        let mut sum = jump.seen[q * p + j];
+                        for k in jump.gains.clone() {
                             sum += variance
                                 * (model.cb[q * m + k] * state.u[k])
                                 * (model.cb[j * m + k] * state.u[k]);
@@ -446,7 +449,7 @@ impl Bank {
     fn sets(&self, h: &Hypothesis, action: Action) -> Kinds {
         let now = h.kinds();
         match action {
-            Action::Stay | Action::Load | Action::Start => now,
+            Action::Stay | Action::Load(_) | Action::Start => now,
             Action::Home => Kinds {
                 additive: 0,
                 stuck: 0,
@@ -547,10 +550,13 @@ impl Bank {
             let kinds = self.sets(child, candidate.action);
             (child.additive, child.stuck, child.scaled) =
                 (kinds.additive, kinds.stuck, kinds.scaled);
-            child.moving = candidate.action == Action::Load;
+            child.moving = matches!(candidate.action, Action::Load(_));
             let fault = layout.fault();
             match candidate.action {
-                Action::Load => child.jump(layout, model, &state.u, self.settings.gain_error),
+                Action::Load(jump) => {
+                    let jump = &model.jumps[jump];
+                    child.jump(layout, model, jump, &state.u, self.settings.gain_error);
+                },
                 Action::Accuse(set) | Action::Change(set) => {
                     for q in 0..p {
                         if !has(set, q) {
@@ -600,7 +606,7 @@ impl Bank {
                     for k in 0..n {
                         let variance = self.own_variance(model, &state.own, k);
                         child.open(k, state.own[k], variance);
-                        child.open(layout.load() + k, 0.0, 0.01 * model.load[k * n + k]);
+                        child.open(layout.load() + k, 0.0, 0.01 * model.load()[k * n + k]);
                         child.before[k] = state.own[k];
                     }
                     let _ = size;
@@ -641,7 +647,7 @@ impl Bank {
             h.score = candidate.score;
             let price = match candidate.action {
                 Action::Stay | Action::Release(_) => 0.0,
-                Action::Load => {
+                Action::Load(_) => {
                     if h.moving && candidate.parent != slot {
                         4.0
                     } else {

@@ -4,7 +4,7 @@
 #![allow(clippy::needless_range_loop)]
 
 use super::linear::{axpy, dot, factor, solve};
-use super::model::{Layout, ModeModel};
+use super::model::{Jump, Layout, ModeModel};
 use crate::kernel::bounded;
 use crate::parameters::Hypotheses as Settings;
 use alloc::vec;
@@ -374,7 +374,7 @@ impl Hypothesis {
                 sum += b * b * s * s;
             }
             let k = load + i;
-            self.cov[k * size + k] += error * sum + walk * model.load[i * n + i];
+            self.cov[k * size + k] += error * sum + walk * model.load()[i * n + i];
         }
         for k in gain..fault {
             self.cov[k * size + k] += settings.gain_walk * settings.gain_walk;
@@ -530,7 +530,7 @@ impl Hypothesis {
                 settings.disturbance_size[k - n] * settings.disturbance_size[k - n]
             } else if k < gain {
                 let i = k - load;
-                4.0 * model.load[i * n + i]
+                4.0 * model.load()[i * n + i]
             } else if k < fault {
                 settings.gain_error * settings.gain_error
             } else if has(self.accused(), k - fault) {
@@ -568,20 +568,27 @@ impl Hypothesis {
         }
     }
 
-    /// The loads jump: `load` and the input gains, with effect on the state at once.
-    pub fn jump(&mut self, layout: Layout, model: &ModeModel, u: &[f64], gain_error: f64) {
+    /// Loads jump, and input gains with them, with effect on the state at once.
+    pub fn jump(
+        &mut self,
+        layout: Layout,
+        model: &ModeModel,
+        jump: &Jump,
+        u: &[f64],
+        gain_error: f64,
+    ) {
         let Layout { n, m, .. } = layout;
         let (size, load, gain) = (layout.size(), layout.load(), layout.gain());
         for i in 0..n {
             for j in 0..n {
-                let v = model.load[i * n + j];
+                let v = jump.load[i * n + j];
                 self.cov[i * size + j] += v;
                 self.cov[i * size + load + j] += v;
                 self.cov[(load + i) * size + j] += v;
                 self.cov[(load + i) * size + load + j] += v;
             }
         }
-        for k in 0..m {
+        for k in jump.gains.clone() {
             let variance = gain_error * gain_error;
             self.cov[(gain + k) * size + gain + k] += variance;
             for i in 0..n {

@@ -33,8 +33,6 @@ use serde::{Deserialize, Serialize};
 const KEEP: usize = 8;
 /// Most hypotheses that may exist while a sample is judged.
 const SLOTS: usize = 2 * KEEP;
-/// How many noise deviations a threshold is.
-const SIGMAS: f64 = 6.0;
 /// Evidence of a frozen sensor from which it is considered, in log likelihood.
 const FREEZING: f64 = 4.0;
 /// Noise deviations (squared) from which loads are said to have moved an output.
@@ -50,6 +48,8 @@ pub struct Bank {
     settings: Hypotheses,
     rotation: Vec<(f64, f64)>,
     prices: Prices,
+    /// Noise deviation of each sensor over its threshold (p).
+    noise_per_threshold: Vec<f64>,
 }
 
 /// Logarithms of the probabilities per sample.
@@ -180,11 +180,12 @@ crate::state!(BankState {
 
 impl Bank {
     /// Judges the readings `y` (p) of a sample taken in `mode`; what is no measurement tells nothing.
-    /// The noise of each sensor follows from its threshold.
+    /// A threshold other than the design's scales the noise of its sensor.
     pub fn observe(&self, state: &mut BankState, mode: usize, y: &[f64], thresholds: &[f64]) {
         let mut noise = core::mem::take(&mut state.noise);
-        for (deviation, &threshold) in noise.iter_mut().zip(thresholds) {
-            *deviation = (threshold.abs() / SIGMAS).clamp(1e-150, 1e100);
+        let scales = thresholds.iter().zip(&self.noise_per_threshold);
+        for (deviation, (&threshold, &share)) in noise.iter_mut().zip(scales) {
+            *deviation = (threshold.abs() * share).clamp(1e-150, 1e100);
         }
         let mut valid = 0;
         for (q, &value) in y.iter().enumerate().take(Sensors::BITS as usize) {
@@ -454,6 +455,11 @@ impl BankState {
     /// Whether every index in it is one; a state that came as bytes may hold any.
     pub fn sound(&self) -> bool {
         self.live.sound() && self.live.contains(self.best)
+    }
+
+    /// The hypotheses in competition.
+    pub fn hypotheses(&self) -> impl Iterator<Item = &Hypothesis> {
+        self.live.slots().filter_map(|slot| self.slots.get(slot))
     }
 
     /// The leading hypothesis.

@@ -3,6 +3,7 @@
 use super::linear::{multiply, multiply_transposed};
 use alloc::vec;
 use alloc::vec::Vec;
+use core::ops::Range;
 
 /// Sizes of the parts of the joint state `[x; d; l; g; f]`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -15,6 +16,17 @@ pub struct Layout {
     pub p: usize,
     /// States `d` of the periodic disturbance.
     pub d: usize,
+}
+
+/// A jump of loads from one source, or of all at once.
+#[derive(Clone, Debug)]
+pub struct Jump {
+    /// Covariance of the load (n x n).
+    pub load: Vec<f64>,
+    /// `C load C'` (p x p).
+    pub seen: Vec<f64>,
+    /// Inputs whose gain jumps with it.
+    pub gains: Range<usize>,
 }
 
 impl Layout {
@@ -57,10 +69,8 @@ pub struct ModeModel {
     pub state_offset: Vec<f64>,
     /// `y0 - C x0` (p).
     pub output_offset: Vec<f64>,
-    /// Covariance of the jump of a load (n x n).
-    pub load: Vec<f64>,
-    /// `C load C'` (p x p).
-    pub load_seen: Vec<f64>,
+    /// What jumps of loads may do: all of them at once first, then each source on its own.
+    pub jumps: Vec<Jump>,
     /// `C B` (p x m).
     pub cb: Vec<f64>,
     /// Square of what the states at their nominal values add to each output (p).
@@ -70,6 +80,11 @@ pub struct ModeModel {
 }
 
 impl ModeModel {
+    /// Covariance of all loads (n x n).
+    pub fn load(&self) -> &[f64] {
+        self.jumps.first().map_or(&[], |all| &all.load)
+    }
+
     /// Fills in what follows from the matrices and the load's covariance.
     #[allow(clippy::too_many_arguments)]
     pub fn new(
@@ -80,7 +95,7 @@ impl ModeModel {
         e: Vec<f64>,
         f: Vec<f64>,
         point: (&[f64], &[f64], &[f64]),
-        load: Vec<f64>,
+        loads: Vec<(Vec<f64>, Range<usize>)>,
         bias: Vec<f64>,
         b_inverse: Vec<f64>,
     ) -> Self {
@@ -101,12 +116,16 @@ impl ModeModel {
                 *value -= c[i * n + j] * x0[j];
             }
         }
-        let mut half = vec![0.0; p * n];
-        multiply(&mut half, &c, &load, n);
-        let mut load_seen = vec![0.0; p * p];
-        multiply_transposed(&mut load_seen, &half, &c, n);
+        let jump = |(load, gains): (Vec<f64>, Range<usize>)| {
+            let mut half = vec![0.0; p * n];
+            multiply(&mut half, &c, &load, n);
+            let mut seen = vec![0.0; p * p];
+            multiply_transposed(&mut seen, &half, &c, n);
+            Jump { load, seen, gains }
+        };
         let mut cb = vec![0.0; p * m];
         multiply(&mut cb, &c, &b, n);
+        let jumps = loads.into_iter().map(jump).collect();
         Self {
             a,
             b,
@@ -117,8 +136,7 @@ impl ModeModel {
             u0: u0.to_vec(),
             state_offset,
             output_offset,
-            load,
-            load_seen,
+            jumps,
             cb,
             bias,
             b_inverse,

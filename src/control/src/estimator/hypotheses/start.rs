@@ -9,6 +9,7 @@ use crate::matrix::Matrix;
 use crate::parameters::{Channels, Hypotheses, ModeModel as Described};
 use alloc::vec;
 use alloc::vec::Vec;
+use core::ops::Range;
 
 /// Standard deviation of loads and input gains at the start, relative to that of their jumps.
 const AT_REST: f64 = 0.3;
@@ -71,29 +72,45 @@ fn left_inverse(b: &[f64], n: usize, m: usize) -> Vec<f64> {
     out
 }
 
-/// Covariance of a load's jump (n x n): through the inputs, the disturbance, and on the states.
-fn load(layout: Layout, mode: &Described, channels: &Channels, settings: &Hypotheses) -> Vec<f64> {
-    let n = layout.n;
-    let mut load = vec![0.0; n * n];
-    let sources = [
-        (&mode.b, &settings.input_load),
-        (&channels.e, &settings.disturbance_load),
-    ];
-    for (matrix, sizes) in sources {
-        for (column, size) in matrix.as_slice().chunks_exact(n).zip(sizes) {
-            for (row, &left) in load.chunks_exact_mut(n).zip(column) {
-                axpy(row, left * size * size, column);
-            }
+/// Covariances of the jumps of loads (n x n each) with the inputs whose gain jumps too: all sources at
+/// once, each input, each channel of the disturbance, the states themselves.
+fn loads(
+    layout: Layout,
+    mode: &Described,
+    channels: &Channels,
+    settings: &Hypotheses,
+) -> Vec<(Vec<f64>, Range<usize>)> {
+    let Layout { n, m, .. } = layout;
+    let mut loads = vec![(vec![0.0; n * n], 0..m)];
+    let column = |column: &[f64], size: f64| {
+        let mut load = vec![0.0; n * n];
+        for (row, &left) in load.chunks_exact_mut(n).zip(column) {
+            axpy(row, left * size * size, column);
         }
+        load
+    };
+    let inputs = mode.b.as_slice().chunks_exact(n).zip(&settings.input_load);
+    for (j, (effect, &size)) in inputs.enumerate() {
+        loads.push((column(effect, size), j..j + 1));
     }
+    let waves = channels.e.as_slice().chunks_exact(n);
+    for (effect, &size) in waves.zip(&settings.disturbance_load) {
+        loads.push((column(effect, size), 0..0));
+    }
+    let mut states = vec![0.0; n * n];
     for i in 0..n {
         for j in 0..n {
             let still = f64::from(i == j) - mode.a.get(i, j).unwrap_or(0.0);
             let moved = still * settings.state_load[j];
-            load[i * n + i] += moved * moved;
+            states[i * n + i] += moved * moved;
         }
     }
-    load
+    loads.push((states, 0..0));
+    let (all, parts) = loads.split_at_mut(1);
+    for (load, _) in parts {
+        axpy(&mut all[0].0, 1.0, load);
+    }
+    loads
 }
 
 fn model(
@@ -119,15 +136,16 @@ fn model(
         waves(&channels.e, harmonics),
         waves(&channels.f, harmonics),
         (&mode.x0, &mode.u0, &mode.y0),
-        load(layout, mode, channels, settings),
+        loads(layout, mode, channels, settings),
         bias,
         inverse,
     )
 }
 
 impl Bank {
-    /// The estimator of a plant with these `modes`; the sizes in `settings` must agree with it.
-    pub fn new(modes: &[Described], settings: &Hypotheses) -> Self {
+    /// The estimator of a plant with these `modes` and decision `thresholds` (p); the sizes in `settings`
+    /// must agree with it.
+    pub fn new(modes: &[Described], settings: &Hypotheses, thresholds: &[f64]) -> Self {
         let (n, m, p) = modes.first().map_or((0, 0, 0), |mode| {
             (mode.a.nrows(), mode.b.ncols(), mode.c.nrows())
         });
@@ -157,6 +175,12 @@ impl Bank {
                 moving: ln(settings.load_moving),
                 settle: ln(1.0 - settings.load_moving),
             },
+            noise_per_threshold: settings
+                .noise
+                .iter()
+                .zip(thresholds)
+                .map(|(noise, threshold)| noise / threshold.abs().max(f64::MIN_POSITIVE))
+                .collect(),
             settings: settings.clone(),
         }
     }
@@ -182,7 +206,7 @@ impl Bank {
             set(i, settings.start[i]);
             set(
                 layout.load() + i,
-                AT_REST * libm::sqrt(model.load[i * n + i]),
+                AT_REST * libm::sqrt(model.load()[i * n + i]),
             );
         }
         for i in 0..d {
@@ -197,7 +221,7 @@ impl Bank {
             slots,
             seen: vec![Innovation::new(layout); SLOTS],
             live: Live::ONE,
-            candidates: Candidates::new(p),
+            candidates: Candidates::new(p, model.jumps.len()),
             scratch: vec![0.0; n.max(1) * size],
             trial: Innovation::new(layout),
             mode: None,
