@@ -36,8 +36,8 @@ pub struct Hypothesis {
     pub scaled: Sensors,
     /// Whether what accuses its sensors could be nothing else.
     pub convinced: bool,
-    /// Whether its loads move now.
-    pub moving: bool,
+    /// Whether the plant is no longer the model.
+    pub loose: bool,
     /// Logarithm of its probability, up to a constant.
     pub score: f64,
     /// Running mean of how badly it fits.
@@ -77,7 +77,7 @@ pub struct Reading<'a> {
 crate::state!(Hypothesis {
     parts: [z, cov, before],
     constants: [],
-    counters: [additive, stuck, scaled, convinced, moving, score, misfit]
+    counters: [additive, stuck, scaled, convinced, loose, score, misfit]
 });
 crate::state!(Innovation {
     parts: [r, rows, s, weights, white],
@@ -264,7 +264,7 @@ impl Hypothesis {
             stuck: 0,
             scaled: 0,
             convinced: true,
-            moving: false,
+            loose: false,
             score: 0.0,
             misfit: layout.p as f64,
         }
@@ -284,7 +284,7 @@ impl Hypothesis {
         self.stuck = other.stuck;
         self.scaled = other.scaled;
         self.convinced = other.convinced;
-        self.moving = other.moving;
+        self.loose = other.loose;
         self.score = other.score;
         self.misfit = other.misfit;
     }
@@ -356,7 +356,8 @@ impl Hypothesis {
         let (size, load, gain, fault) =
             (layout.size(), layout.load(), layout.gain(), layout.fault());
         let active = self.active(layout, bias);
-        let error = settings.model_error * settings.model_error;
+        let error = if self.loose { settings.load_moving } else { settings.model_error };
+        let error = error * error;
         let walk = settings.load_walk * settings.load_walk;
         // The model's error acts as a load that moves as the state and the input move.
         let (moved, _) = scratch.split_at_mut(n);

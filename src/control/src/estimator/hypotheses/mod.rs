@@ -30,7 +30,7 @@ use model::ModeModel;
 use serde::{Deserialize, Serialize};
 
 /// Most hypotheses that stay after a sample.
-const KEEP: usize = 8;
+const KEEP: usize = 12;
 /// Most hypotheses that may exist while a sample is judged.
 const SLOTS: usize = 2 * KEEP;
 /// Evidence of a frozen sensor from which it is considered, in log likelihood.
@@ -60,8 +60,6 @@ struct Prices {
     release: f64,
     change: f64,
     load: f64,
-    moving: f64,
-    settle: f64,
 }
 
 /// The slots in use, the leading hypothesis first.
@@ -227,7 +225,7 @@ impl Bank {
         let h = &state.slots[head];
         let calm = alone
             && h.accused() == 0
-            && !h.moving
+            && !h.loose
             && state.seen[head].square < QUIET + 2.0 * p as f64
             && state.seen[head].sound
             && state.evidence.iter().all(|&e| e < FREEZING)
@@ -369,7 +367,7 @@ impl Bank {
             };
         }
         state.misfit += RENEWED * (state.seen[state.best].square.min(1e3) - state.misfit);
-        state.model_valid = state.misfit < 4.0 * p as f64 && !h.moving;
+        state.model_valid = state.misfit < 4.0 * p as f64 && !h.loose;
         self.find_load(state, model);
         state.actuator_fault = 0;
         for (j, (load, size)) in state.load.iter().zip(&self.settings.input_load).enumerate() {

@@ -172,8 +172,6 @@ impl Bank {
                 release: ln(settings.release_rate),
                 change: ln(settings.change_rate),
                 load: ln(settings.load_rate),
-                moving: ln(settings.load_moving),
-                settle: ln(1.0 - settings.load_moving),
             },
             noise_per_threshold: settings
                 .noise
