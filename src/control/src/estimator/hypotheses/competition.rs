@@ -135,7 +135,7 @@ impl Bank {
         let unlikely = square > QUIET.min(4.0 + p as f64);
         if unlikely {
             for jump in 0..model.jumps.len() {
-                let together = if jump == 0 { TOGETHER } else { 1.0 };
+                let together = if jump == 0 { 2.0 } else if jump + 1 == model.jumps.len() { 1.5 } else { 1.0 };
                 let value = together * self.prices.load
                     + self.trial(state, slot, model, reading, Action::Load(jump));
                 state.candidates.add(Candidate {
