@@ -289,7 +289,6 @@ fn hypotheses(settings: &Hypotheses, sizes: Sizes) -> Checked {
         settings.release_rate,
         settings.change_rate,
         settings.load_rate,
-        settings.load_moving,
     ];
     let sensible = rates.iter().all(|rate| (1e-100..=0.999).contains(rate));
     range(
@@ -298,7 +297,7 @@ fn hypotheses(settings: &Hypotheses, sizes: Sizes) -> Checked {
         "must have rates from 1e-100 to 0.999",
     )?;
     let shares = [
-        settings.surprise,
+        settings.changed_error,
         settings.odds,
         settings.fault_walk,
         settings.drift_walk,

@@ -243,10 +243,8 @@ pub struct Hypotheses {
     pub change_rate: f64,
     /// Jumps of loads or of input gains per sample.
     pub load_rate: f64,
-    /// Probability that a load that moves goes on moving in the next sample.
-    pub load_moving: f64,
-    /// What a sample costs at most while loads move, in log likelihood.
-    pub surprise: f64,
+    /// Relative error of the matrices of a plant that is no longer the model.
+    pub changed_error: f64,
     /// Log odds that an accusation must have against the best explanation without one.
     pub odds: f64,
     /// Standard deviation of a new fault (p), output units.

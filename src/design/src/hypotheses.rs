@@ -43,12 +43,10 @@ const STUCK_RATE: f64 = 1e-7;
 const CHANGE_RATE: f64 = 1e-3;
 /// Jumps of loads or input gains per sample: as rare as faults.
 const LOAD_RATE: f64 = 1e-5;
-/// Probability that a load that moves goes on moving in the next sample.
-const LOAD_MOVING: f64 = 0.05;
-/// What a sample costs at most while loads move, in log likelihood.
-const SURPRISE: f64 = 2.0;
-/// Log odds of an accusation against the best explanation without one: 400 to 1.
-const ODDS: f64 = 6.0;
+/// Relative error of the matrices of a plant that is no longer the model.
+const CHANGED_ERROR: f64 = 1.0;
+/// Log odds of an accusation against the best explanation without one: 7 to 1.
+const ODDS: f64 = 2.0;
 /// Wander of an abrupt fault per sample, in noise deviations.
 const FAULT_WALK: f64 = 0.05;
 /// Wander of a fault that grew slowly per sample, in noise deviations.
@@ -76,12 +74,13 @@ const DISTURBANCE: f64 = 0.3;
 const START: f64 = 3e-3;
 
 impl HypothesesSpec {
-    /// The estimator's sizes and rates for `plant` with these signals, under the disturbance that is
-    /// `known`.
+    /// The estimator's sizes and rates for `plant` with these signals and this `noise` of the sensors (p), under
+    /// the disturbance that is `known`.
     pub fn settings(
         &self,
         plant: &SwitchedPlant,
         signals: &Signals,
+        noise: Vec<f64>,
         known: Option<&KnownDisturbance>,
     ) -> Hypotheses {
         let scaling = assembly::scaling(signals);
@@ -100,13 +99,13 @@ impl HypothesesSpec {
         });
         Hypotheses {
             channels: channels.collect(),
+            noise,
             fault_rate: self.fault_rate,
             stuck_rate: STUCK_RATE,
             release_rate: 1.0 / self.fault_length,
             change_rate: CHANGE_RATE,
             load_rate: LOAD_RATE,
-            load_moving: LOAD_MOVING,
-            surprise: SURPRISE,
+            changed_error: CHANGED_ERROR,
             odds: ODDS,
             fault_size: per_sensor(plant, outputs, FAULT_OF_RANGE, FAULT_SIZE),
             fault_walk: FAULT_WALK,

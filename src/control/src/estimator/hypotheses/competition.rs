@@ -18,6 +18,8 @@ const ALIKE: usize = 2;
 pub(super) const QUIET: f64 = 8.0;
 /// Price of several sensors at once, relative to that of one.
 const TOGETHER: f64 = 1.5;
+/// Price of all loads at once, and of a plant that is no longer the model, relative to that of one load.
+pub(super) const UNLIKE: f64 = 2.0;
 /// Price of a fault before the first sample: one sensor in a hundred.
 const AT_START: f64 = -4.6;
 /// Mean of the relative error of a sensor's wrong gain.
@@ -135,7 +137,13 @@ impl Bank {
         let unlikely = square > QUIET.min(4.0 + p as f64);
         if unlikely {
             for jump in 0..model.jumps.len() {
-                let together = if jump == 0 { 2.0 } else if jump + 1 == model.jumps.len() { 1.5 } else { 1.0 };
+                let together = if jump == 0 {
+                    UNLIKE
+                } else if jump + 1 == model.jumps.len() {
+                    TOGETHER
+                } else {
+                    1.0
+                };
                 let value = together * self.prices.load
                     + self.trial(state, slot, model, reading, Action::Load(jump));
                 state.candidates.add(Candidate {
@@ -146,8 +154,8 @@ impl Bank {
                 });
             }
             if !loose {
-                let value = self.settings.surprise * self.prices.load
-                    + self.trial(state, slot, model, reading, Action::Loosen);
+                let value =
+                    self.prices.changed + self.trial(state, slot, model, reading, Action::Loosen);
                 state.candidates.add(Candidate {
                     score: score + value,
                     parent: slot,
@@ -474,7 +482,7 @@ impl Bank {
         u: &'a [f64],
     ) -> impl Iterator<Item = f64> + 'a {
         let Layout { n, m, .. } = self.layout;
-        let error = self.settings.load_moving * self.settings.load_moving;
+        let error = self.settings.changed_error * self.settings.changed_error;
         (0..n).map(move |i| {
             let mut sum = 0.0;
             let row = &model.a[i * n..(i + 1) * n];
@@ -499,7 +507,9 @@ impl Bank {
     fn sets(&self, h: &Hypothesis, action: Action) -> Kinds {
         let now = h.kinds();
         match action {
-            Action::Stay | Action::Load(_) | Action::Loosen | Action::Tighten | Action::Start => now,
+            Action::Stay | Action::Load(_) | Action::Loosen | Action::Tighten | Action::Start => {
+                now
+            }
             Action::Home => Kinds {
                 additive: 0,
                 stuck: 0,
@@ -619,7 +629,7 @@ impl Bank {
                 Action::Load(jump) => {
                     let jump = &model.jumps[jump];
                     child.jump(layout, model, jump, &state.u, self.settings.gain_error);
-                },
+                }
                 Action::Accuse(set) | Action::Change(set) => {
                     for q in 0..p {
                         if !has(set, q) {
@@ -669,8 +679,10 @@ impl Bank {
                     for k in 0..n {
                         let variance = self.own_variance(model, &state.own, k);
                         child.open(k, state.own[k], variance);
-                        child.open(layout.load() + k, 0.0, 0.01 * model.load()[k * n + k]);
                         child.before[k] = state.own[k];
+                    }
+                    for (k, size) in model.load_size.iter().enumerate() {
+                        child.open(layout.load() + k, 0.0, 0.01 * size * size);
                     }
                     let _ = size;
                     for q in 0..p {
@@ -696,9 +708,11 @@ impl Bank {
                     }
                 }
                 Action::Loosen => {
-                    let (load, size) = (layout.load(), layout.size());
+                    let (load, size) = (layout.load() + layout.state_load(), layout.size());
                     for (i, v) in self.looseness(model, parent, &state.u).enumerate() {
-                        for (row, column) in [(i, i), (i, load + i), (load + i, i), (load + i, load + i)] {
+                        for (row, column) in
+                            [(i, i), (i, load + i), (load + i, i), (load + i, load + i)]
+                        {
                             child.cov[row * size + column] += v;
                         }
                     }

@@ -352,11 +352,16 @@ impl Hypothesis {
         du: &[f64],
         scratch: &mut [f64],
     ) {
-        let Layout { n, m, p, d } = layout;
+        let Layout { n, m, p, d, .. } = layout;
         let (size, load, gain, fault) =
             (layout.size(), layout.load(), layout.gain(), layout.fault());
         let active = self.active(layout, bias);
-        let error = if self.loose { settings.load_moving } else { settings.model_error };
+        let loads = layout.loads();
+        let error = if self.loose {
+            settings.changed_error
+        } else {
+            settings.model_error
+        };
         let error = error * error;
         let walk = settings.load_walk * settings.load_walk;
         // The model's error acts as a load that moves as the state and the input move.
@@ -374,8 +379,11 @@ impl Hypothesis {
             for (&b, &s) in model.b[i * m..(i + 1) * m].iter().zip(du) {
                 sum += b * b * s * s;
             }
-            let k = load + i;
-            self.cov[k * size + k] += error * sum + walk * model.load()[i * n + i];
+            let k = load + layout.state_load() + i;
+            self.cov[k * size + k] += error * sum;
+        }
+        for (k, deviation) in (load..gain).zip(&model.load_size) {
+            self.cov[k * size + k] += walk * deviation * deviation;
         }
         for k in gain..fault {
             self.cov[k * size + k] += settings.gain_walk * settings.gain_walk;
@@ -418,11 +426,11 @@ impl Hypothesis {
                     );
                 }
             }
-            axpy(
-                row,
-                1.0,
-                &self.cov[(load + i) * size..(load + i) * size + active],
-            );
+            for (k, &factor) in (load..gain).zip(&model.g[i * loads..(i + 1) * loads]) {
+                if factor != 0.0 {
+                    axpy(row, factor, &self.cov[k * size..k * size + active]);
+                }
+            }
             for (j, (&b, &u)) in model.b[i * m..(i + 1) * m].iter().zip(u).enumerate() {
                 let factor = b * u;
                 if factor != 0.0 {
@@ -440,7 +448,7 @@ impl Hypothesis {
             for j in 0..=i {
                 let mut sum = dot(&row[..n], &model.a[j * n..(j + 1) * n])
                     + dot(&row[n..n + d], &model.e[j * d..(j + 1) * d])
-                    + row[load + j];
+                    + dot(&row[load..gain], &model.g[j * loads..(j + 1) * loads]);
                 for ((&r, &b), &u) in row[gain..fault]
                     .iter()
                     .zip(&model.b[j * m..(j + 1) * m])
@@ -461,7 +469,7 @@ impl Hypothesis {
         // The state.
         for i in 0..n {
             let mut sum = model.state_offset[i]
-                + self.z[load + i]
+                + dot(&model.g[i * loads..(i + 1) * loads], &self.z[load..gain])
                 + dot(&model.a[i * n..(i + 1) * n], &self.z[..n])
                 + dot(&model.e[i * d..(i + 1) * d], &self.z[n..n + d]);
             for ((&b, &u), &g) in model.b[i * m..(i + 1) * m]
@@ -530,8 +538,8 @@ impl Hypothesis {
             } else if k < n + d {
                 settings.disturbance_size[k - n] * settings.disturbance_size[k - n]
             } else if k < gain {
-                let i = k - load;
-                4.0 * model.load()[i * n + i]
+                let size = model.load_size[k - load];
+                4.0 * (size * size).max(self.z[k] * self.z[k])
             } else if k < fault {
                 settings.gain_error * settings.gain_error
             } else if has(self.accused(), k - fault) {
@@ -580,13 +588,21 @@ impl Hypothesis {
     ) {
         let Layout { n, m, .. } = layout;
         let (size, load, gain) = (layout.size(), layout.load(), layout.gain());
-        for i in 0..n {
-            for j in 0..n {
-                let v = jump.load[i * n + j];
-                self.cov[i * size + j] += v;
-                self.cov[i * size + load + j] += v;
-                self.cov[(load + i) * size + j] += v;
-                self.cov[(load + i) * size + load + j] += v;
+        let loads = layout.loads();
+        for k in jump.loads.clone() {
+            let variance = model.load_size[k] * model.load_size[k];
+            let at = load + k;
+            self.cov[at * size + at] += variance;
+            for i in 0..n {
+                let left = variance * model.g[i * loads + k];
+                if left == 0.0 {
+                    continue;
+                }
+                self.cov[i * size + at] += left;
+                self.cov[at * size + i] += left;
+                for j in 0..n {
+                    self.cov[i * size + j] += left * model.g[j * loads + k];
+                }
             }
         }
         for k in jump.gains.clone() {

@@ -60,6 +60,7 @@ struct Prices {
     release: f64,
     change: f64,
     load: f64,
+    changed: f64,
 }
 
 /// The slots in use, the leading hypothesis first.
@@ -250,7 +251,8 @@ impl Bank {
     /// Another mode: what the model misses, and what a load does, may differ.
     fn enter(&self, state: &mut BankState, mode: usize) {
         let Layout { n, m, .. } = self.layout;
-        let (size, load) = (self.layout.size(), self.layout.load());
+        let size = self.layout.size();
+        let load = self.layout.load() + self.layout.state_load();
         let model = &self.modes[mode];
         let error = self.settings.model_error * self.settings.model_error;
         for slot in state.live.slots() {
@@ -378,11 +380,18 @@ impl Bank {
     /// Load and gain error of the leading hypothesis as an input.
     fn find_load(&self, state: &mut BankState, model: &ModeModel) {
         let Layout { n, m, .. } = self.layout;
-        let (load, gain) = (self.layout.load(), self.layout.gain());
+        let (load, gain, loads) = (self.layout.load(), self.layout.gain(), self.layout.loads());
         let z = &state.slots[state.best].z;
         for j in 0..m {
-            state.load[j] = dot(&model.b_inverse[j * n..(j + 1) * n], &z[load..load + n])
-                + state.u[j] * z[gain + j];
+            state.load[j] = z[load + j] + state.u[j] * z[gain + j];
+            for i in 0..n {
+                let others = m..loads;
+                let effect = dot(
+                    &model.g[i * loads + m..(i + 1) * loads],
+                    &z[load..gain][others],
+                );
+                state.load[j] += model.b_inverse[j * n + i] * effect;
+            }
         }
     }
 

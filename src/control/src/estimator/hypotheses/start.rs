@@ -1,6 +1,6 @@
 //! From the plant and the settings to an estimator ready to run.
 
-use super::competition::Candidates;
+use super::competition::{Candidates, UNLIKE};
 use super::hypothesis::{Hypothesis, Innovation};
 use super::linear::{axpy, factor, solve};
 use super::model::{Layout, ModeModel};
@@ -9,7 +9,6 @@ use crate::matrix::Matrix;
 use crate::parameters::{Channels, Hypotheses, ModeModel as Described};
 use alloc::vec;
 use alloc::vec::Vec;
-use core::ops::Range;
 
 /// Standard deviation of loads and input gains at the start, relative to that of their jumps.
 const AT_REST: f64 = 0.3;
@@ -72,45 +71,31 @@ fn left_inverse(b: &[f64], n: usize, m: usize) -> Vec<f64> {
     out
 }
 
-/// Covariances of the jumps of loads (n x n each) with the inputs whose gain jumps too: all sources at
-/// once, each input, each channel of the disturbance, the states themselves.
+/// What loads do to the states (n x loads), and how large they are: on each input, each channel of the
+/// disturbance, each state.
 fn loads(
     layout: Layout,
     mode: &Described,
     channels: &Channels,
     settings: &Hypotheses,
-) -> Vec<(Vec<f64>, Range<usize>)> {
-    let Layout { n, m, .. } = layout;
-    let mut loads = vec![(vec![0.0; n * n], 0..m)];
-    let column = |column: &[f64], size: f64| {
-        let mut load = vec![0.0; n * n];
-        for (row, &left) in load.chunks_exact_mut(n).zip(column) {
-            axpy(row, left * size * size, column);
-        }
-        load
-    };
-    let inputs = mode.b.as_slice().chunks_exact(n).zip(&settings.input_load);
-    for (j, (effect, &size)) in inputs.enumerate() {
-        loads.push((column(effect, size), j..j + 1));
-    }
-    let waves = channels.e.as_slice().chunks_exact(n);
-    for (effect, &size) in waves.zip(&settings.disturbance_load) {
-        loads.push((column(effect, size), 0..0));
-    }
-    let mut states = vec![0.0; n * n];
+) -> (Vec<f64>, Vec<f64>) {
+    let Layout { n, m, s, .. } = layout;
+    let effect = Matrix::from_fn(n, layout.loads(), |i, k| match k {
+        k if k < m => mode.b.get(i, k).unwrap_or(0.0),
+        k if k < m + s => channels.e.get(i, k - m).unwrap_or(0.0),
+        k => f64::from(k - m - s == i),
+    });
+    let mut sizes = settings.input_load.clone();
+    sizes.extend(&settings.disturbance_load);
     for i in 0..n {
-        for j in 0..n {
+        let mut sum = 0.0;
+        for (j, size) in settings.state_load.iter().enumerate() {
             let still = f64::from(i == j) - mode.a.get(i, j).unwrap_or(0.0);
-            let moved = still * settings.state_load[j];
-            states[i * n + i] += moved * moved;
+            sum += (still * size) * (still * size);
         }
+        sizes.push(libm::sqrt(sum));
     }
-    loads.push((states, 0..0));
-    let (all, parts) = loads.split_at_mut(1);
-    for (load, _) in parts {
-        axpy(&mut all[0].0, 1.0, load);
-    }
-    loads
+    (rows(&effect), sizes)
 }
 
 fn model(
@@ -151,7 +136,13 @@ impl Bank {
         });
         let disturbances = settings.disturbance_load.len();
         let d = 2 * settings.angles.len() * disturbances;
-        let layout = Layout { n, m, p, d };
+        let layout = Layout {
+            n,
+            m,
+            p,
+            d,
+            s: disturbances,
+        };
         let described = modes.iter().zip(&settings.channels);
         let ln = libm::log;
         let turn = |_| {
@@ -172,6 +163,7 @@ impl Bank {
                 release: ln(settings.release_rate),
                 change: ln(settings.change_rate),
                 load: ln(settings.load_rate),
+                changed: UNLIKE * ln(settings.load_rate),
             },
             noise_per_threshold: settings
                 .noise
@@ -192,7 +184,7 @@ impl Bank {
     /// At rest at the operating point of `mode`.
     pub fn start(&self, mode: usize) -> BankState {
         let layout = self.layout;
-        let Layout { n, m, p, d } = layout;
+        let Layout { n, m, p, d, .. } = layout;
         let size = layout.size();
         let settings = &self.settings;
         let model = &self.modes[mode];
@@ -202,10 +194,9 @@ impl Bank {
         let mut set = |k: usize, deviation: f64| first.cov[k * size + k] = deviation * deviation;
         for i in 0..n {
             set(i, settings.start[i]);
-            set(
-                layout.load() + i,
-                AT_REST * libm::sqrt(model.load()[i * n + i]),
-            );
+        }
+        for (k, size) in model.load_size.iter().enumerate() {
+            set(layout.load() + k, AT_REST * size);
         }
         for i in 0..d {
             set(n + i, settings.disturbance_size[i]);
