@@ -11,7 +11,7 @@ ZIG := target/platforms/zig
 FUZZER := cargo-fuzz@0.13.1
 TOOLS := $(CURDIR)/target/tools
 
-.PHONY: build fmu-linux64 fmu-all wheel test-wheel compare-platforms test test-rust test-python browser demo bench fuzz soak memcheck threadcheck lint clean
+.PHONY: build fmu-linux64 fmu-all wheel test-wheel compare-platforms test test-rust test-python browser demo bench fuzz soak memcheck threadcheck lint package clean
 
 # The program, and the FMU binaries by themselves with the profile meant for them: built with the
 # whole workspace they would carry the solver's symbols along.
@@ -52,7 +52,7 @@ $(ZIG)/ready: tools/platforms/requirements.txt tools/python/requirements.txt
 	$(ZIG)/bin/pip install --quiet --disable-pip-version-check --requirement tools/platforms/requirements.txt --requirement tools/python/requirements.txt
 	touch $@
 
-test: lint test-rust test-python
+test: lint package test-rust test-python
 
 # In release mode: the design's optimisation problems are solved many times over, and the Python
 # tests need the release binaries anyway.
@@ -106,8 +106,10 @@ $(TOOLS)/$(FUZZER):
 
 TICKS ?= 100000000
 
+# Built with the whole workspace's features, so that what the tests compiled is used again.
 soak:
-	cargo run --release --package fmu-host --example soak -- $(TICKS)
+	cargo build --release --workspace --exclude ftc-python --example soak
+	target/release/examples/soak $(TICKS)
 
 # valgrind over the C programs of tests/c on both FMUs: its memcheck on one instance and its twin,
 # its two checkers of threads on eight threads with two loops each.
@@ -125,6 +127,12 @@ lint: $(VENV)/ready
 	$(IN_VENV)ruff check
 	$(IN_VENV)ruff format --check
 	$(PYTHON) tests/promises.py
+
+# Each library crate as it would be published, built from its archive alone.
+LIBRARIES := ftc-plant ftc-control ftc-lapack ftc-design ftc-simulate ftc-identify
+
+package:
+	cargo package --quiet --allow-dirty --target-dir target/packaged $(LIBRARIES:%=--package %)
 
 clean:
 	cargo clean

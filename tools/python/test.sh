@@ -12,6 +12,8 @@ mkdir -p "$folder"
 wheel=$(ls -t dist/ftc_fmu-*manylinux*x86_64.whl | head -1)
 "$environment/bin/pip" install --quiet --disable-pip-version-check "${wheel}[all]" --constraint tests/requirements.txt \
     --constraint tools/python/tests/requirements.txt --requirement tests/requirements.txt
+# For the FMUs it holds, made by OpenModelica; what it depends on is not needed.
+"$environment/bin/pip" install --quiet --disable-pip-version-check --no-deps gemseo-fmu==3.1.1
 
 # No cargo, no rustc: what is tested is what a user has.
 PATH=$PWD/$environment/bin:/usr/local/bin:/usr/bin:/bin

@@ -4,8 +4,9 @@
 //! something else: for no plant do they have a strictly feasible point.
 
 use super::augmented::augment;
+use super::blocks::{BlockKind, BlockName};
 use super::lmi::{Affine, Inequality, Margin, Problem};
-use super::verdict::{BlockKind, BlockName, ConflictingBlock, DesignError, by_weight};
+use super::verdict::{ConflictingBlock, DesignError, by_weight};
 use super::{ControlSpec, Units};
 use ftc_plant::{Dimensions, SwitchedPlant};
 use serde::Serialize;

@@ -2,17 +2,17 @@
 
 use super::commissioning::{self, Database, LONGEST_RESPONSE, RecordedDisturbance};
 use super::harmonics;
+pub use super::harmonics::KnownDisturbance;
 use super::hypotheses::HypothesesSpec;
 use super::matrices::{dense, plain};
 use super::{
-    ControlSpec, ControllerDesign, Design, DesignError, FORMAT, ObserverSpec, Run, Signal, Signals,
-    check_controllable, synthesise_with,
+    ControlSpec, ControllerDesign, Design, DesignError, FORMAT, Failure, ObserverSpec, Run, Signal,
+    Signals, check_controllable, synthesise_with,
 };
 use crate::running_loop::{TRANSFER_DECAY, TransferCertificate};
 use ftc_control::parameters::{
     Compensation, Estimator, EstimatorMethod, Harmonics, Limits, Predictor, StateFeedback, Transfer,
 };
-use ftc_plant::scaling::Scaling;
 use ftc_plant::{Dimensions, Mode, SwitchedPlant};
 use ftc_plant::{Scenario, TruePlant};
 
@@ -87,27 +87,6 @@ pub enum Threshold {
     Sigmas(f64),
 }
 
-/// What is known of the periodic disturbance.
-#[derive(Clone, Debug, PartialEq)]
-pub struct KnownDisturbance {
-    /// Period in seconds.
-    pub period: f64,
-    /// Harmonics, the fundamental included.
-    pub harmonics: usize,
-    /// Largest value of each channel (s), if known.
-    pub amplitude: Option<Vec<f64>>,
-}
-
-impl KnownDisturbance {
-    /// Angle per sample (radians) of each harmonic, for [`ControlSpec::resonators`].
-    pub fn angles(&self, sample_time: f64) -> Vec<f64> {
-        let fundamental = core::f64::consts::TAU * sample_time / self.period;
-        (1..=self.harmonics)
-            .map(|harmonic| harmonic as f64 * fundamental)
-            .collect()
-    }
-}
-
 /// The smallest threshold that is chosen automatically, relative to the nominal value.
 const SMALLEST_THRESHOLD: f64 = 1e-3;
 
@@ -154,19 +133,19 @@ const MOST_COEFFICIENTS: usize = 2000;
 /// # Errors
 /// [`DesignError::Request`] where the request is ill-formed, else what the synthesis says.
 pub fn assemble(request: Request) -> Result<Design, DesignError> {
-    assemble_with(request, &Run::default())
+    Ok(assemble_with(request, &Run::default())?)
 }
 
 /// [`assemble`] with a chosen solver and someone who watches.
 ///
 /// # Errors
-/// As [`assemble`].
-pub fn assemble_with(request: Request, run: &Run) -> Result<Design, DesignError> {
+/// As [`assemble`], with the part that was found.
+pub fn assemble_with(request: Request, run: &Run) -> Result<Design, Failure> {
     let dims = Dimensions::check(&request.plant).map_err(DesignError::Request)?;
     let asked = request.control.check(dims);
     asked.map_err(DesignError::Request)?;
     let estimator = estimator(&request, dims).map_err(DesignError::Request)?;
-    let scaling = scaling(&request.signals);
+    let scaling = request.signals.scaling();
     check_controllable(&request.plant, &request.control, &scaling).map_err(DesignError::Request)?;
     let observer = ObserverSpec {
         noise: observer_noise(&request),
@@ -182,7 +161,8 @@ pub fn assemble_with(request: Request, run: &Run) -> Result<Design, DesignError>
             "controller.bumpless = true cannot be proved for this design: set it to false, ask for another decay, or for \
              lyapunov = \"dwell\""
                 .into(),
-        ));
+        )
+        .into());
     }
     let input_limits = limits(&request.signals.inputs);
     let feedback = feedback(
@@ -221,16 +201,6 @@ fn observer_noise(request: &Request) -> Vec<f64> {
     outputs
         .map(|(noise, output)| noise.max(SMALLEST_THRESHOLD * output.nominal))
         .collect()
-}
-
-/// The nominal values of the signals.
-pub fn scaling(signals: &Signals) -> Scaling {
-    let nominal = |signals: &[Signal]| signals.iter().map(|s| s.nominal).collect();
-    Scaling {
-        states: nominal(&signals.states),
-        inputs: nominal(&signals.inputs),
-        outputs: nominal(&signals.outputs),
-    }
 }
 
 fn limits(inputs: &[Signal]) -> Vec<Limits> {

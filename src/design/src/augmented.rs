@@ -21,7 +21,9 @@
 //! and the weight of the integrator of their output: excited at its own frequency, a pair grows
 //! at `1 / sqrt(2)` of the rate at which the integrator grows under a constant.
 
+use super::units::power_of_two;
 use super::{ControlSpec, Units};
+use ftc_plant::scaling::Scaling;
 use ftc_plant::{Mode, SwitchedPlant};
 use nalgebra::DMatrix;
 
@@ -64,6 +66,31 @@ pub fn augment(plant: &SwitchedPlant, spec: &ControlSpec, units: &Units) -> Vec<
     (0..plant.modes.len())
         .map(|mode| augment_mode(plant, mode, spec, units))
         .collect()
+}
+
+impl Units {
+    /// The powers of two nearest the nominal values, with the integrator, the disturbance and the
+    /// performance signal brought near one as well.
+    pub fn choose(plant: &SwitchedPlant, spec: &ControlSpec, scaling: &Scaling) -> Self {
+        let round = |values: &[f64]| values.iter().map(|&v| power_of_two(v)).collect::<Vec<_>>();
+        let outputs = round(&scaling.outputs);
+        let step = power_of_two(plant.sample_time);
+        let mut units = Self {
+            integrators: spec.tracked.iter().map(|&o| step * outputs[o]).collect(),
+            states: round(&scaling.states),
+            inputs: round(&scaling.inputs),
+            outputs,
+            disturbance: 1.0,
+            performance: 1.0,
+        };
+        let models = augment(plant, spec, &units);
+        let largest = |values: &mut dyn Iterator<Item = f64>| values.fold(0.0, f64::max);
+        let disturbance = largest(&mut models.iter().map(|model| model.e.amax()));
+        let performance = largest(&mut models.iter().map(|m| m.h.amax().max(m.d.amax())));
+        units.disturbance = 1.0 / power_of_two(disturbance);
+        units.performance = power_of_two(performance);
+        units
+    }
 }
 
 fn augment_mode(

@@ -12,9 +12,10 @@
 //! of the performance signal; the integrals are left out, as `N` moves their final value. `N` stands
 //! outside the loop: whatever it is, every proof about the loop holds unchanged.
 
+use super::StateFeedback;
 use super::augmented::{AugmentedMode, augment};
-use super::certificate::scaled_gain;
-use super::{StateFeedback, pseudo_inverse};
+use super::matrices::pseudo_inverse;
+use super::state_feedback::scaled_gain;
 use ftc_plant::SwitchedPlant;
 use nalgebra::DMatrix;
 

@@ -11,6 +11,27 @@ use ftc_control::parameters::PhasorMap;
 use ftc_plant::{Mode, SwitchedPlant};
 use nalgebra::{Complex, DMatrix, DVector};
 
+/// What is known of the periodic disturbance.
+#[derive(Clone, Debug, PartialEq)]
+pub struct KnownDisturbance {
+    /// Period in seconds.
+    pub period: f64,
+    /// Harmonics, the fundamental included.
+    pub harmonics: usize,
+    /// Largest value of each channel (s), if known.
+    pub amplitude: Option<Vec<f64>>,
+}
+
+impl KnownDisturbance {
+    /// Angle per sample (radians) of each harmonic, for [`ControlSpec::resonators`].
+    pub fn angles(&self, sample_time: f64) -> Vec<f64> {
+        let fundamental = core::f64::consts::TAU * sample_time / self.period;
+        (1..=self.harmonics)
+            .map(|harmonic| harmonic as f64 * fundamental)
+            .collect()
+    }
+}
+
 /// Singular values below this fraction of the largest count as zero.
 const TOLERANCE: f64 = 1e-9;
 

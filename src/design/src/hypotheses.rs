@@ -1,6 +1,6 @@
 //! Sizes and rates for the state-based estimator, from the plant and its signals.
 
-use crate::assembly::{self, KnownDisturbance};
+use crate::harmonics::KnownDisturbance;
 use crate::matrices::plain;
 use crate::{Signal, Signals};
 use ftc_control::parameters::{Ambiguous, Channels, Hypotheses};
@@ -83,7 +83,7 @@ impl HypothesesSpec {
         noise: Vec<f64>,
         known: Option<&KnownDisturbance>,
     ) -> Hypotheses {
-        let scaling = assembly::scaling(signals);
+        let scaling = signals.scaling();
         let outputs = &signals.outputs;
         let disturbance = known
             .and_then(|known| known.amplitude.clone())

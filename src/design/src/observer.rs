@@ -13,6 +13,7 @@ mod kalman;
 mod lost;
 #[cfg(feature = "solver")]
 mod lost_synthesis;
+mod proof;
 #[cfg(feature = "solver")]
 mod synthesis;
 
@@ -22,7 +23,6 @@ pub(crate) use existence::check_decoupling;
 #[cfg(feature = "solver")]
 pub(crate) use lost::gains_fit as lost_gains_fit;
 pub use lost::{LostCertificate, MOST_FOR_PAIRS, sets};
-pub(crate) use lost::{corrected_error, verify as verify_lost};
 
 #[cfg(feature = "solver")]
 use existence::PerUnit;
@@ -31,7 +31,7 @@ pub use synthesis::synthesise;
 #[cfg(feature = "solver")]
 pub(crate) use synthesis::{Candidate, candidates, with_lost_sensors};
 
-use super::certificate::{self, CertificateError, LyapunovMatrix};
+use super::certificate::{CertificateError, LyapunovMatrix};
 use super::{DwellTime, ObserverSpec};
 use ftc_control::parameters::Observer;
 use ftc_plant::SwitchedPlant;
@@ -73,6 +73,6 @@ impl ObserverDesign {
     /// # Errors
     /// The first inequality that cannot be proved, or what does not fit.
     pub fn verify(&self, plant: &SwitchedPlant) -> Result<(), CertificateError> {
-        certificate::verify_observer(plant, self)
+        proof::verify(plant, self)
     }
 }

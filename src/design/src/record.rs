@@ -8,6 +8,7 @@ use ftc_control::parameters::{
 };
 use ftc_plant::Dimensions;
 use ftc_plant::SwitchedPlant;
+use ftc_plant::scaling::Scaling;
 use ftc_plant::{Scenario, TruePlant};
 use serde::{Deserialize, Serialize};
 
@@ -64,6 +65,18 @@ pub struct Signals {
     /// Disturbances (s), or none where they are not described.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub disturbances: Vec<Signal>,
+}
+
+impl Signals {
+    /// The nominal values of inputs, outputs and states.
+    pub fn scaling(&self) -> Scaling {
+        let nominal = |signals: &[Signal]| signals.iter().map(|s| s.nominal).collect();
+        Scaling {
+            states: nominal(&self.states),
+            inputs: nominal(&self.inputs),
+            outputs: nominal(&self.outputs),
+        }
+    }
 }
 
 /// One signal.

@@ -37,7 +37,19 @@ pub(crate) fn solve(a: &DMatrix<f64>, g: &DMatrix<f64>, h: &DMatrix<f64>) -> Opt
 
 /// `X = a' X a + h` for a stable `a`: the sum of `a'^k h a^k`; `None` where it does not converge.
 pub(crate) fn lyapunov(a: &DMatrix<f64>, h: &DMatrix<f64>) -> Option<DMatrix<f64>> {
-    solve(a, &DMatrix::zeros(a.nrows(), a.nrows()), h)
+    let (mut a, mut h) = (a.clone(), h.clone());
+    for _ in 0..DOUBLINGS {
+        let growth = a.transpose() * (&h * &a);
+        a = &a * &a;
+        h = symmetric(h + &growth);
+        if !h.iter().chain(a.iter()).all(|value| value.is_finite()) {
+            return None;
+        }
+        if growth.amax() <= CONVERGED * h.amax() {
+            return Some(h);
+        }
+    }
+    None
 }
 
 /// `(x + x') / 2`.

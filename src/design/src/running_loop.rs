@@ -9,6 +9,7 @@
 //! the first also under arbitrary switching where one Lyapunov function gives it within
 //! [`TOLERANCE`] of what a measured state would.
 
+mod frequency;
 mod gain;
 mod model;
 #[cfg(feature = "solver")]
@@ -19,10 +20,10 @@ mod transfer;
 #[cfg(feature = "solver")]
 mod transfer_synthesis;
 
+use crate::blocks::{BlockKind, BlockName};
 use crate::certificate::{CertificateError, FactoredLyapunov, require};
 use crate::observer::{check_detectable, sets};
 use crate::riccati;
-use crate::verdict::{BlockKind, BlockName};
 use crate::{ObserverDesign, StateFeedback, Units};
 use ftc_control::Matrix;
 use ftc_plant::SwitchedPlant;

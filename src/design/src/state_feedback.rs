@@ -8,6 +8,7 @@ mod advice;
 mod direct;
 #[cfg(feature = "solver")]
 mod frame;
+mod proof;
 #[cfg(feature = "solver")]
 mod riccati;
 #[cfg(feature = "solver")]
@@ -20,9 +21,11 @@ mod theorem;
 #[cfg(feature = "solver")]
 pub use synthesis::{synthesise, synthesise_with};
 
-use super::certificate::{self, CertificateError, ControlCertificate};
-use super::matrices::plain;
-use super::{ControlSpec, DwellTime, pseudo_inverse};
+pub(crate) use proof::scaled_gain;
+
+use super::certificate::{CertificateError, ControlCertificate};
+use super::matrices::{plain, pseudo_inverse};
+use super::{ControlSpec, DwellTime};
 use ftc_control::Matrix;
 use ftc_control::parameters::{self, FeedbackGains};
 use ftc_plant::SwitchedPlant;
@@ -90,7 +93,7 @@ impl StateFeedback {
     /// # Errors
     /// The first inequality that cannot be proved, or what does not fit.
     pub fn verify(&self, plant: &SwitchedPlant) -> Result<(), CertificateError> {
-        certificate::verify_state_feedback(plant, self)
+        proof::verify(plant, self)
     }
 
     /// What the on-line controller needs of it on this plant. Every inverse is taken here, so that

@@ -40,29 +40,6 @@ impl Units {
         }
     }
 
-    /// The powers of two nearest the nominal values, with the integrator, the disturbance and the
-    /// performance signal brought near one as well.
-    pub fn choose(plant: &SwitchedPlant, spec: &ControlSpec, scaling: &Scaling) -> Self {
-        let round = |values: &[f64]| values.iter().map(|&v| power_of_two(v)).collect::<Vec<_>>();
-        let outputs = round(&scaling.outputs);
-        let step = power_of_two(plant.sample_time);
-        let mut units = Self {
-            integrators: spec.tracked.iter().map(|&o| step * outputs[o]).collect(),
-            states: round(&scaling.states),
-            inputs: round(&scaling.inputs),
-            outputs,
-            disturbance: 1.0,
-            performance: 1.0,
-        };
-        let models = super::augmented::augment(plant, spec, &units);
-        let largest = |values: &mut dyn Iterator<Item = f64>| values.fold(0.0, f64::max);
-        let disturbance = largest(&mut models.iter().map(|model| model.e.amax()));
-        let performance = largest(&mut models.iter().map(|m| m.h.amax().max(m.d.amax())));
-        units.disturbance = 1.0 / power_of_two(disturbance);
-        units.performance = power_of_two(performance);
-        units
-    }
-
     /// The unit of each state of the integral part (q entries), in the order of the augmented model.
     pub fn integral_part(&self, spec: &ControlSpec) -> Vec<f64> {
         let pairs = self.integrators.iter().flat_map(|&unit| [unit; 2]);

@@ -1,78 +1,10 @@
 //! Verdicts a person can use: which inequality, what went wrong, what to try.
 
 use super::ControlSpec;
+use super::blocks::BlockName;
+use super::certificate::CertificateError;
 use serde::{Deserialize, Serialize};
 use std::fmt;
-
-/// What an inequality demands.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum BlockKind {
-    /// The closed loop's state shrinks by the decay rate each sample.
-    Decay,
-    /// The disturbance reaches the performance signal attenuated to gamma.
-    Attenuation,
-    /// The observer's error shrinks by its decay rate each sample.
-    ObserverDecay,
-    /// The Lyapunov functions of two modes differ by at most the factor mu.
-    LyapunovRatio,
-    /// The disturbance reaches the performance signal of the running loop attenuated to its gain.
-    RunningLoop,
-    /// Sensor noise reaches the true tracking error of the running loop with at most its gain.
-    NoiseGain,
-    /// Bumpless transfer keeps the loop stable.
-    Transfer,
-    /// A fault that is not noticed reaches the true tracking error with at most its gain.
-    FaultGain,
-    /// The Lyapunov matrix itself is positive definite.
-    Lyapunov,
-    /// A theorem as the paper prints it.
-    Printed,
-}
-
-/// The name of an inequality: its kind, the mode, and the mode that follows it.
-#[derive(Clone, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
-pub struct BlockName {
-    /// What it demands.
-    pub kind: BlockKind,
-    /// Number of the active mode, from 1.
-    pub mode: usize,
-    /// Number of the mode that is active one sample later, from 1.
-    pub successor: usize,
-}
-
-impl BlockName {
-    /// Names an inequality by mode *indices* (from 0).
-    pub fn new(kind: BlockKind, mode: usize, successor: usize) -> Self {
-        Self {
-            kind,
-            mode: mode + 1,
-            successor: successor + 1,
-        }
-    }
-}
-
-impl fmt::Display for BlockName {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let kind = match self.kind {
-            BlockKind::Decay => "decay",
-            BlockKind::Attenuation => "attenuation",
-            BlockKind::ObserverDecay => "observer decay",
-            BlockKind::LyapunovRatio => "Lyapunov ratio",
-            BlockKind::RunningLoop => "gamma_loop",
-            BlockKind::NoiseGain => "noise gain",
-            BlockKind::Transfer => "bumpless transfer",
-            BlockKind::FaultGain => "fault gain",
-            BlockKind::Lyapunov => "Lyapunov matrix",
-            BlockKind::Printed => "printed inequality",
-        };
-        write!(f, "{kind} of mode {}", self.mode)?;
-        if self.successor != self.mode {
-            write!(f, " when mode {} follows", self.successor)?;
-        }
-        Ok(())
-    }
-}
 
 /// An inequality and how much of the conflict it carries.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -260,27 +192,13 @@ pub enum DesignError {
     /// The gains were found, but their certificate does not check.
     #[error("{0}")]
     Uncertified(Uncertified),
-    /// One part of the design failed, another was found.
-    #[error("{}", .0.error)]
-    Partial(Box<Partial>),
-}
-
-/// What was found of a design that failed.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Partial {
-    /// Why there is no design.
-    pub error: DesignError,
-    /// The certified state feedback, if that was found.
-    pub state_feedback: Option<super::StateFeedback>,
-    /// The certified observer, if that was found.
-    pub observer: Option<super::ObserverDesign>,
 }
 
 /// A certificate that does not check, and what would help.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Uncertified {
     /// What could not be proved.
-    pub reason: super::CertificateError,
+    pub reason: CertificateError,
     /// Changes that were tried and help; empty when none of those tried does.
     pub advice: Vec<Advice>,
 }
@@ -299,8 +217,8 @@ impl fmt::Display for Uncertified {
     }
 }
 
-impl From<super::CertificateError> for DesignError {
-    fn from(reason: super::CertificateError) -> Self {
+impl From<CertificateError> for DesignError {
+    fn from(reason: CertificateError) -> Self {
         Self::Uncertified(Uncertified {
             reason,
             advice: Vec::new(),
@@ -315,25 +233,8 @@ impl DesignError {
         match self {
             Self::Infeasible(infeasibility) => Some(&mut infeasibility.advice),
             Self::Uncertified(uncertified) => Some(&mut uncertified.advice),
-            Self::Partial(partial) => partial.error.advice_mut(),
             Self::Request(_) | Self::Solver(_) => None,
         }
-    }
-
-    /// The same with the parts that were found.
-    pub(crate) fn with_parts(
-        self,
-        state_feedback: Option<super::StateFeedback>,
-        observer: Option<super::ObserverDesign>,
-    ) -> Self {
-        if state_feedback.is_none() && observer.is_none() {
-            return self;
-        }
-        Self::Partial(Box::new(Partial {
-            error: self,
-            state_feedback,
-            observer,
-        }))
     }
 }
 

@@ -14,8 +14,8 @@ use std::path::Path;
 /// # Errors
 /// [`Failure::Refused`] with the report where a theorem is infeasible, else as the theorems.
 pub fn report(path: &Path, request: Request, as_json: bool) -> Result<String, Failure> {
-    let verdicts =
-        solve(&request).map_err(|error| Failure::new(path, request.control.clone(), error))?;
+    let verdicts = solve(&request)
+        .map_err(|error| Failure::new(path, request.control.clone(), error.into()))?;
     let output = match as_json {
         true => json(&verdicts),
         false => text(&request.name, &verdicts),

@@ -17,7 +17,7 @@ pub enum Failure {
         /// What was asked for.
         asked: Box<ControlSpec>,
         /// Why not.
-        error: Box<DesignError>,
+        error: Box<ftc_design::Failure>,
         /// What to print to standard output beside the error.
         output: Option<String>,
     },
@@ -34,11 +34,11 @@ pub enum Failure {
 
 impl Failure {
     /// Sorts a design error: an ill-formed request is the design file's fault.
-    pub fn new(path: &Path, asked: ControlSpec, error: DesignError) -> Self {
+    pub fn new(path: &Path, asked: ControlSpec, error: ftc_design::Failure) -> Self {
         let file = path.display().to_string();
-        match error {
+        match error.error {
             DesignError::Request(what) => Self::Input(format!("{file}: {what}")),
-            error => Self::NoDesign {
+            _ => Self::NoDesign {
                 file,
                 asked: Box::new(asked),
                 error: Box::new(error),

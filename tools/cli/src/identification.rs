@@ -295,6 +295,13 @@ fn design_file(
         names(&first.inputs),
         names(&first.outputs)
     );
+    if let Some(period) = asked.period {
+        let _ = write!(
+            text,
+            "\n[disturbance]\nperiod = {period:?} # seconds\nharmonics = {}\n",
+            asked.harmonics
+        );
+    }
     let folder = asked.out.parent().unwrap_or(Path::new(""));
     let paths: Vec<String> = asked
         .logs

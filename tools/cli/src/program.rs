@@ -23,7 +23,7 @@ use design_file::Loaded;
 use failure::Failure;
 use ftc_design::assembly::Request;
 use ftc_design::warnings::LoggedMovement;
-use ftc_design::{Design, DesignError, Run, Solver, Step};
+use ftc_design::{Design, Run, Solver, Step};
 use package::output::Staging;
 use progress::Progress;
 use report::{summary, warnings};
@@ -469,7 +469,7 @@ fn synthesised(
     request: Request,
     solver: Solver,
     progress: &Progress,
-) -> Result<Design, DesignError> {
+) -> Result<Design, ftc_design::Failure> {
     progress.tell("solving for gains and certifying them");
     let watch = |step: Step| match step {
         Step::Iteration { number, usual, .. } => progress.iterate(step, number, usual),

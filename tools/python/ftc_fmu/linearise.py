@@ -11,6 +11,7 @@ from xml.etree import ElementTree as ET
 
 import numpy as np
 
+from ftc_fmu._elements import Element, Elements, labels, whole
 from ftc_fmu.errors import DesignFileError, FtcError, extra
 from ftc_fmu.plant import Plant
 from ftc_fmu.sampled import SampledModel
@@ -30,7 +31,7 @@ def from_fmu(
     path: str | PathLike[str],
     inputs: Sequence[str],
     outputs: Sequence[str],
-    operating_points: Sequence[Mapping[str, float]] | None = None,
+    operating_points: Sequence[Mapping[str, Any]] | None = None,
     *,
     sample_time: float,
     disturbance_inputs: Sequence[str] = (),
@@ -47,10 +48,11 @@ def from_fmu(
 
     Args:
         path: The FMU.
-        inputs: Variables that the controller commands (m).
+        inputs: Variables that the controller commands (m). Here and below, the name of an array (FMI 3)
+            stands for all its elements, "u[2]" or "A[1,3]" for one.
         outputs: Variables that sensors measure (p).
-        operating_points: Per mode the values of inputs, parameters and states that make it; what is
-            not named keeps its start value. One mode at the start values by default.
+        operating_points: Per mode the values of inputs, parameters and states that make it, of arrays as
+            lists; what is not named keeps its start value. One mode at the start values by default.
         sample_time: Seconds between two samples of the design.
         disturbance_inputs: Inputs that nobody commands; they become E and F.
         states: Of a co-simulation FMU, outputs that together are its state (n).
@@ -72,14 +74,18 @@ def from_fmu(
     if description.fmiVersion.startswith("1"):
         raise DesignFileError(f"{path} is of FMI {description.fmiVersion}: export it as FMI 2 or 3", "path")
     points = [dict(point) for point in operating_points] if operating_points else [{}]
+    elements = Elements(description)
+    inputs, outputs = elements.names(inputs), elements.names(outputs)
+    disturbance_inputs = elements.names(disturbance_inputs)
+    states = elements.names(states) if states else None
+    points = [elements.assignments(point) for point in points]
     driven = [*inputs, *disturbance_inputs]
-    _known(description, [*driven, *outputs, *(states or []), *(name for point in points for name in point)])
     if description.modelExchange is None and not states:
         raise DesignFileError(
             f"{path} is for co-simulation only: give states=, outputs that together are its state", "states"
         )
     folder = fmpy.extract(str(path))
-    source = _Source(fmpy, description, folder, driven, outputs)
+    source = _Source(fmpy, description, elements, folder, driven, outputs)
     try:
         if description.modelExchange is not None:
             found = [_continuous(source, point, steady=steady) for point in points]
@@ -95,9 +101,9 @@ def from_fmu(
         [matrices for matrices, _ in found],
         sample_time,
         disturbance_inputs=list(range(commanded, len(driven))),
-        inputs=[_table(description, name) for name in inputs],
-        outputs=[_table(description, name) for name in outputs],
-        states=[_table(description, name) for name in (states or _state_names(description))],
+        inputs=[_table(elements, name) for name in inputs],
+        outputs=[_table(elements, name) for name in outputs],
+        states=[_table(elements, name) for name in (states or _state_names(description))],
         operating_points=[{"x": x, "u": u[:commanded], "y": y} for _, (x, u, y) in found],
         names=names,
     )
@@ -109,20 +115,10 @@ class _Source:
 
     fmpy: Any
     description: Any
+    elements: Elements
     folder: str
     inputs: Sequence[str]
     outputs: Sequence[str]
-
-
-def _known(description: Any, names: list[str]) -> None:  # noqa: ANN401
-    """Refuses names that the FMU has not, and tables of numbers."""
-    variables = {variable.name: variable for variable in description.modelVariables}
-    for name in names:
-        if name not in variables:
-            near = [known for known in variables if known.lower() == name.lower()] or list(variables)[:12]
-            raise DesignFileError(f'the FMU has no variable "{name}": it has {", ".join(near)}', name)
-        if getattr(variables[name], "dimensions", None):
-            raise DesignFileError(f'"{name}" is an array: give scalar variables', name)
 
 
 def _provides_derivatives(folder: str) -> bool:
@@ -134,12 +130,12 @@ def _provides_derivatives(folder: str) -> bool:
 
 
 def _state_names(description: Any) -> list[str]:  # noqa: ANN401
-    return [unknown.variable.derivative.name for unknown in description.derivatives]
+    return [name for unknown in description.derivatives for name in labels(unknown.variable.derivative)]
 
 
-def _table(description: Any, name: str) -> dict[str, Any]:  # noqa: ANN401
+def _table(elements: Elements, name: str) -> dict[str, Any]:
     """Name, unit and nominal value, as far as the FMU says them."""
-    (variable,) = [variable for variable in description.modelVariables if variable.name == name]
+    variable = elements[name].variable
     declared = getattr(variable, "declaredType", None)
     unit = variable.unit or (declared.unit if declared is not None else None)
     table: dict[str, Any] = {"name": name}
@@ -151,8 +147,8 @@ def _table(description: Any, name: str) -> dict[str, Any]:  # noqa: ANN401
     return table
 
 
-def _nominals(description: Any, names: Sequence[str]) -> np.ndarray:  # noqa: ANN401
-    return np.array([_table(description, name).get("nominal", 1.0) for name in names])
+def _nominals(elements: Elements, names: Sequence[str]) -> np.ndarray:
+    return np.array([_table(elements, name).get("nominal", 1.0) for name in names])
 
 
 class _Instance:
@@ -160,7 +156,7 @@ class _Instance:
 
     def __init__(self, source: _Source, kind: str) -> None:
         self.fmi3 = source.description.fmiVersion.startswith("3")
-        self.variables = {variable.name: variable for variable in source.description.modelVariables}
+        self.elements = source.elements
         self.fmu = source.fmpy.instantiate_fmu(source.folder, source.description, fmi_type=kind)
 
     def initialise(self, values: Mapping[str, float]) -> None:
@@ -175,25 +171,45 @@ class _Instance:
         self.fmu.exitInitializationMode()
 
     def _set_all(self, values: Mapping[str, float], pick: Callable[[Any], bool]) -> None:
+        """Sets start values; what is not named of an array keeps the start value that the FMU declares."""
+        numbers: dict[int, list[float]] = {}
         for name, value in values.items():
-            variable = self.variables[name]
+            element = self.elements[name]
+            variable = element.variable
             if not pick(variable):
                 continue
-            kind = variable.type
-            setter = getattr(self.fmu, f"set{kind}")
-            given = bool(value) if kind == "Boolean" else float(value) if kind in ("Real", "Float64") else int(value)
-            setter([variable.valueReference], [given])
+            if variable.type in ("Real", "Float64"):
+                array = numbers.setdefault(variable.valueReference, element.start())
+                array[element.position] = float(value)
+            else:
+                given = bool(value) if variable.type == "Boolean" else int(value)
+                getattr(self.fmu, f"set{variable.type}")([variable.valueReference], [given])
+        self._set_arrays(numbers)
 
-    def references(self, names: Sequence[str]) -> list[int]:
-        return [self.variables[name].valueReference for name in names]
+    def references(self, names: Sequence[str]) -> list[Element]:
+        return [self.elements[name] for name in names]
 
-    def get(self, references: list[int]) -> np.ndarray:
-        values = self.fmu.getFloat64(references) if self.fmi3 else self.fmu.getReal(references)
-        return np.array(list(values), dtype=float)
+    def get(self, elements: list[Element]) -> np.ndarray:
+        arrays = self._arrays(elements)
+        return np.array([arrays[element.variable.valueReference][element.position] for element in elements])
 
-    def set(self, references: list[int], values: np.ndarray) -> None:
-        if references:
-            (self.fmu.setFloat64 if self.fmi3 else self.fmu.setReal)(references, [float(value) for value in values])
+    def set(self, elements: list[Element], values: np.ndarray) -> None:
+        # What is not an element keeps its value: an array is set as a whole.
+        arrays = self._arrays([element for element in elements if element.size > 1])
+        for element, value in zip(elements, values, strict=True):
+            reference = element.variable.valueReference
+            arrays.setdefault(reference, [0.0])[element.position] = float(value)
+        self._set_arrays(arrays)
+
+    def _set_arrays(self, arrays: Mapping[int, list[float]]) -> None:
+        for reference, array in arrays.items():
+            (self.fmu.setFloat64 if self.fmi3 else self.fmu.setReal)([reference], array)
+
+    def _arrays(self, elements: list[Element]) -> dict[int, list[float]]:
+        """The values of whole variables, by value reference."""
+        if self.fmi3:
+            return {reference: self.fmu.getFloat64([reference], size) for reference, size in whole(elements).items()}
+        return {reference: list(self.fmu.getReal([reference])) for reference in whole(elements)}
 
     def free(self) -> None:
         try:
@@ -243,7 +259,8 @@ def _continuous(source: _Source, point: Mapping[str, float], *, steady: bool) ->
     description, inputs = source.description, source.inputs
     names = _state_names(description)
     n = len(names)
-    directional = _provides_derivatives(source.folder)
+    # Directional derivatives are asked for number by number; of arrays, differences are taken.
+    directional = _provides_derivatives(source.folder) and not _has_arrays(source, names)
     model = _Continuous(source, "ModelExchange")
     try:
         model.initialise(point)
@@ -253,11 +270,13 @@ def _continuous(source: _Source, point: Mapping[str, float], *, steady: bool) ->
         x, u = model.states(n), model.get(given)
 
         def evaluate(x: np.ndarray, u: np.ndarray) -> np.ndarray:
+            # Outputs first: OpenModelica's FMUs forget that outputs are old once derivatives were read.
             model.set_states(x)
             model.set(given, u)
-            return np.concatenate([model.derivatives(n), model.get(read)])
+            y = model.get(read)
+            return np.concatenate([model.derivatives(n), y])
 
-        sizes = np.maximum(np.abs(np.concatenate([x, u])), _nominals(description, [*names, *inputs]))
+        sizes = np.maximum(np.abs(np.concatenate([x, u])), _nominals(source.elements, [*names, *inputs]))
 
         def jacobian(x: np.ndarray, u: np.ndarray) -> np.ndarray:
             evaluate(x, u)
@@ -276,15 +295,20 @@ def _continuous(source: _Source, point: Mapping[str, float], *, steady: bool) ->
     return (full[:n, :n], full[:n, n:], full[n:, :n], full[n:, n:], 0.0), (x, u, y)
 
 
+def _has_arrays(source: _Source, states: list[str]) -> bool:
+    return any(source.elements[name].size > 1 for name in [*states, *source.inputs, *source.outputs])
+
+
 def _directional(
     model: _Continuous,
     description: Any,  # noqa: ANN401
     names: list[str],
-    given: list[int],
-    read: list[int],
+    given: list[Element],
+    read: list[Element],
 ) -> np.ndarray:
-    unknowns = [unknown.variable.valueReference for unknown in description.derivatives] + read
-    knowns = model.references(names) + given
+    unknowns = [unknown.variable.valueReference for unknown in description.derivatives]
+    unknowns += [element.variable.valueReference for element in read]
+    knowns = [element.variable.valueReference for element in model.references(names) + given]
     columns = [model.fmu.getDirectionalDerivative(unknowns, [known], [1.0]) for known in knowns]
     return np.array([list(column) for column in columns]).T.reshape(len(unknowns), len(knowns))
 
@@ -345,7 +369,7 @@ def _sampled(
         model.initialise(point)
         return model
 
-    sizes = _nominals(source.description, source.inputs)
+    sizes = _nominals(source.elements, source.inputs)
     names = (source.inputs, source.outputs, states)
     A, B, C, D, at = SampledModel(fresh, names, sizes, sample_time, settle).linearise()
     return (A, B, C, D, sample_time), at

@@ -79,7 +79,6 @@ pub fn of_design(py: Python<'_>, error: &DesignError, text: &str, author: Author
         DesignError::Uncertified(found) => {
             make(py, "Uncertified", (sentence, advice(&found.advice)))
         }
-        DesignError::Partial(partial) => of_design(py, &partial.error, text, author),
         _ => make(py, "NoDesign", (sentence,)),
     }
 }

@@ -5,6 +5,7 @@ promise: python-fmu-in
 
 from __future__ import annotations
 
+import importlib.metadata
 import re
 import subprocess
 import zipfile
@@ -20,7 +21,12 @@ from conftest import EXAMPLES
 
 HEADERS = Path(fmpy.__file__).parent / "c-code"
 DERIVATIVES = {"fmi2GetDirectionalDerivative", "fmi3GetDirectionalDerivative"}
-SOURCE = Path(__file__).parent / "oscillator.c"
+# FMUs that OpenModelica made, out of a package that is installed for them alone.
+OPENMODELICA = {
+    Path(file).name: Path(file.locate())
+    for file in importlib.metadata.distribution("gemseo-fmu").files
+    if "linux" in file.parts and file.suffix == ".fmu"
+}
 
 FMI2 = """<?xml version="1.0" encoding="UTF-8"?>
 <fmiModelDescription fmiVersion="2.0" modelName="oscillator" guid="{{1}}">
@@ -62,29 +68,50 @@ FMI3 = """<?xml version="1.0" encoding="UTF-8"?>
 </fmiModelDescription>"""
 
 
-@pytest.fixture(scope="module", params=[(2, True), (2, False), (3, True), (3, False)], ids=str)
-def oscillator(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """The FMU of another maker, with directional derivatives and without."""
-    version, derivatives = request.param
-    folder = tmp_path_factory.mktemp("oscillator")
-    library = folder / "oscillator.so"
-    flags = [f"-DFMI={version}", *(["-DDERIVATIVES"] if derivatives else [])]
+ARRAYS = """<?xml version="1.0" encoding="UTF-8"?>
+<fmiModelDescription fmiVersion="3.0" modelName="arrays" instantiationToken="1">
+<ModelExchange modelIdentifier="arrays"/>
+<ModelVariables>
+<Float64 name="time" valueReference="9" causality="independent" variability="continuous"/>
+<Float64 name="x" valueReference="0" causality="local" initial="exact" start="0 0"><Dimension start="2"/></Float64>
+<Float64 name="der(x)" valueReference="1" derivative="0"><Dimension start="2"/></Float64>
+<Float64 name="u" valueReference="2" causality="input" start="0 0"><Dimension start="2"/></Float64>
+<Float64 name="y" valueReference="3" causality="output"><Dimension start="2"/></Float64>
+<Float64 name="A" valueReference="4" causality="parameter" variability="fixed" start="-1 0 0 -1">
+<Dimension start="2"/><Dimension start="2"/></Float64>
+</ModelVariables>
+<ModelStructure><Output valueReference="3"/><ContinuousStateDerivative valueReference="1"/></ModelStructure>
+</fmiModelDescription>"""
+
+
+def made(folder: Path, source: str, version: int, text: str, flags: list[str]) -> Path:
+    """An FMU from its C source and its description."""
+    code = Path(__file__).parent / f"{source}.c"
+    library = folder / f"{source}.so"
     # fmpy looks for every function of the standard; those it never calls here lead nowhere.
     names = re.findall(
         rf"#define (fmi{version}\w+)\s+fmi{version}FullName", (HEADERS / f"fmi{version}Functions.h").read_text()
     )
-    written = set(re.findall(r"^fmi\w+ \*?(fmi\w+)\(|^void (fmi\w+)\(", SOURCE.read_text(), re.MULTILINE))
-    there = {name for pair in written for name in pair} - (set() if derivatives else DERIVATIVES)
+    written = set(re.findall(r"^fmi\w+ \*?(fmi\w+)\(|^void (fmi\w+)\(", code.read_text(), re.MULTILINE))
+    there = {name for pair in written for name in pair} - (set() if "-DDERIVATIVES" in flags else DERIVATIVES)
     absent = [f"-Wl,--defsym={name}=fmi{version}Terminate" for name in names if name not in there]
-    command = ["cc", "-shared", "-fPIC", "-O1", *flags, "-I", HEADERS, SOURCE, *absent, "-o", library]
+    command = ["cc", "-shared", "-fPIC", "-O1", f"-DFMI={version}", *flags, "-I", HEADERS, code, *absent, "-o", library]
     subprocess.run(command, check=True)
-    attribute = {2: "providesDirectionalDerivative", 3: "providesDirectionalDerivatives"}[version]
-    text = {2: FMI2, 3: FMI3}[version].format(derivatives=f'{attribute}="{str(derivatives).lower()}"')
-    fmu = folder / "oscillator.fmu"
+    fmu = folder / f"{source}.fmu"
     with zipfile.ZipFile(fmu, "w") as archive:
         archive.writestr("modelDescription.xml", text)
-        archive.write(library, f"binaries/{ {2: 'linux64', 3: 'x86_64-linux'}[version] }/oscillator.so")
+        archive.write(library, f"binaries/{ {2: 'linux64', 3: 'x86_64-linux'}[version] }/{source}.so")
     return fmu
+
+
+@pytest.fixture(scope="module", params=[(2, True), (2, False), (3, True), (3, False)], ids=str)
+def oscillator(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The FMU of another maker, with directional derivatives and without."""
+    version, derivatives = request.param
+    attribute = {2: "providesDirectionalDerivative", 3: "providesDirectionalDerivatives"}[version]
+    text = {2: FMI2, 3: FMI3}[version].format(derivatives=f'{attribute}="{str(derivatives).lower()}"')
+    flags = ["-DDERIVATIVES"] if derivatives else []
+    return made(tmp_path_factory.mktemp("oscillator"), "oscillator", version, text, flags)
 
 
 def test_a_model_exchange_fmu_is_linearised(oscillator: Path) -> None:
@@ -114,6 +141,52 @@ def test_linearised_where_it_is(oscillator: Path) -> None:
     A = np.array([[0.0, 1.0], [-2 * 0.3 * 0.4 - 3 * 0.09, 1 - 0.09]])
     np.testing.assert_allclose(plant.modes[0].A, scipy.linalg.expm(0.1 * A), atol=1e-8)
     np.testing.assert_allclose(plant.modes[0].C, [[1.0, 0.08]], atol=1e-8)
+
+
+def test_arrays_are_taken_element_by_element(tmp_path: Path) -> None:
+    """By the array's name or by an element's; parameters as matrices, what is not named keeps its start value."""
+    fmu = made(tmp_path, "arrays", 3, ARRAYS, [])
+    A = np.array([[-1.0, 0.5], [0.2, -2.0]])
+    plant = ftc.Plant.from_fmu(
+        fmu,
+        ["u[2]"],
+        ["y"],
+        [{"A": A, "u": [1.0, 2.0]}, {"A[1,2]": 0.25, "u[1]": 3.0}],
+        sample_time=0.1,
+        disturbance_inputs=["u[1]"],
+    )
+    for mode, (matrix, u) in zip(plant.modes, [(A, [1, 2]), (np.array([[-1, 0.25], [0, -1]]), [3, 0])], strict=True):
+        Ad, Bd, *_ = scipy.signal.cont2discrete((matrix, np.eye(2), np.eye(2), matrix), 0.1)
+        found = [mode.A, mode.B, mode.C, mode.D, mode.E, mode.F]
+        expected = [Ad, Bd[:, 1:], np.eye(2), matrix[:, 1:], Bd[:, :1], matrix[:, :1]]
+        for got, one in zip(found, expected, strict=True):
+            np.testing.assert_allclose(got, one, atol=1e-8)
+        np.testing.assert_allclose(mode.operating_point.x, np.linalg.solve(matrix, -np.array(u)), atol=1e-8)
+    assert [signal["name"] for signal in plant.signals["states"]] == ["x[1]", "x[2]"]
+    with pytest.raises(ftc.DesignFileError, match='"A" takes 4 numbers, not 2'):
+        ftc.Plant.from_fmu(fmu, ["u"], ["y"], [{"A": [1.0, 2.0]}], sample_time=0.1)
+
+
+def test_fmus_of_openmodelica() -> None:
+    """A mass with spring and damper, and a chain's half, equal to their equations."""
+    plant = ftc.Plant.from_fmu(OPENMODELICA["Mass_Damper.fmu"], ["f"], ["y"], sample_time=1e-3)
+    A, B = np.array([[0.0, 1.0], [-1e4, -10.0]]), np.array([[0.0], [-1.0]])
+    Ad, Bd, *_ = scipy.signal.cont2discrete((A, B, np.eye(2), np.zeros((2, 1))), 1e-3)
+    (mode,) = plant.modes
+    np.testing.assert_allclose(mode.A, Ad, atol=1e-7)
+    np.testing.assert_allclose(mode.B, Bd, atol=1e-9)
+    np.testing.assert_allclose(mode.C, [[-1.0, 0.0]], atol=1e-8)
+    assert plant.signals["inputs"] == [{"name": "f", "unit": "N"}]
+
+    points = [{"k1": 2.0, "k2": 1.0, "m1": 1.0}, {"k1": 3.0, "k2": 1.0, "m1": 2.0}]
+    plant = ftc.Plant.from_fmu(OPENMODELICA["MassSpringSubSystem1.fmu"], ["x2"], ["x1"], points, sample_time=0.1)
+    for mode, point in zip(plant.modes, points, strict=True):
+        stiffness = (point["k1"] + point["k2"]) / point["m1"]
+        A, B = np.array([[0.0, -stiffness], [1.0, 0.0]]), np.array([[point["k2"] / point["m1"]], [0.0]])
+        Ad, Bd, *_ = scipy.signal.cont2discrete((A, B, np.eye(2), np.zeros((2, 1))), 0.1)
+        np.testing.assert_allclose(mode.A, Ad, atol=1e-8)
+        np.testing.assert_allclose(mode.B, Bd, atol=1e-8)
+        np.testing.assert_allclose(mode.C, [[0.0, 1.0]], atol=1e-8)
 
 
 def test_wrong_names_are_refused(oscillator: Path) -> None:

@@ -5,7 +5,9 @@ use crate::text::{count, number};
 use crate::warnings;
 use ftc_control::parameters::{Compensation, EstimatorMethod, Hypotheses, ObserverKind};
 use ftc_design::augmented::assumes_input_disturbance;
-use ftc_design::{ControlSpec, Design, DesignError, ObserverDesign, Signal, StateFeedback};
+use ftc_design::{
+    ControlSpec, Design, DesignError, Failure, ObserverDesign, Signal, StateFeedback,
+};
 use serde_json::{Value, json};
 use std::fmt::Write;
 
@@ -346,16 +348,10 @@ pub fn json(design: &Design, warnings: &[String]) -> String {
 }
 
 /// The same object when there is no design.
-pub fn json_of_failure(asked: &ControlSpec, error: &DesignError) -> String {
-    let (cause, control, observer) = match error {
-        DesignError::Partial(partial) => (
-            &partial.error,
-            partial.state_feedback.as_ref(),
-            partial.observer.as_ref(),
-        ),
-        whole => (whole, None, None),
-    };
-    let (feasible, blocks, advice) = match cause {
+pub fn json_of_failure(asked: &ControlSpec, failure: &Failure) -> String {
+    let (control, observer) = (&failure.state_feedback, &failure.observer);
+    let (control, observer) = (control.as_ref(), observer.as_ref());
+    let (feasible, blocks, advice) = match &failure.error {
         DesignError::Infeasible(infeasibility) => (
             Value::Bool(false),
             infeasibility
@@ -368,7 +364,7 @@ pub fn json_of_failure(asked: &ControlSpec, error: &DesignError) -> String {
         DesignError::Uncertified(uncertified) => {
             (Value::Bool(true), Vec::new(), uncertified.advice.as_slice())
         }
-        DesignError::Request(_) | DesignError::Solver(_) | DesignError::Partial(_) => {
+        DesignError::Request(_) | DesignError::Solver(_) => {
             (Value::Null, Vec::new(), [].as_slice())
         }
     };
@@ -389,7 +385,7 @@ pub fn json_of_failure(asked: &ControlSpec, error: &DesignError) -> String {
         "latency": asked.latency,
         "blocks": blocks,
         "advice": advice,
-        "reason": error.to_string(),
+        "reason": failure.to_string(),
     }))
 }
 

@@ -3,7 +3,8 @@
 use super::congruences;
 use super::conic::{self, Conic};
 use super::expression::{Affine, Variable};
-use crate::verdict::{BlockName, SolverFailure};
+use crate::blocks::BlockName;
+use crate::verdict::SolverFailure;
 use nalgebra::DMatrix;
 
 /// A symmetric block matrix, affine in the unknowns, that must be positive (semi)definite.

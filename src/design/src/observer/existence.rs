@@ -2,7 +2,7 @@
 
 use crate::augmented::scaled;
 use crate::matrices::dense;
-use crate::pseudo_inverse;
+use crate::matrices::pseudo_inverse;
 use ftc_plant::{Mode, SwitchedPlant};
 use nalgebra::DMatrix;
 

@@ -8,13 +8,13 @@
 //! [`Observer::minimum_dwell`]: ftc_control::parameters::Observer::minimum_dwell
 
 use super::ObserverDesign;
+use super::proof::error_dynamics;
+use crate::blocks::BlockKind;
 use crate::certificate::{
-    CertificateError, Enclosure, LyapunovMatrix, error_dynamics, growth_block, prove, require,
-    scaled_plant,
+    CertificateError, Enclosure, LyapunovMatrix, growth_block, prove, require, scaled_plant,
 };
 use crate::lyapunov::all_pairs;
 use crate::matrices::dense;
-use crate::verdict::BlockKind;
 use ftc_control::Matrix;
 #[cfg(feature = "solver")]
 use ftc_control::parameters::Observer;

@@ -4,11 +4,11 @@
 //! to white noise the Lyapunov inequality. A stated level needs nothing else: the matrix that proves it
 //! comes from a Riccati or Lyapunov equation at that very level, and only its proof is trusted.
 
+use super::frequency::Response;
 use crate::certificate::{Coordinates, Enclosure, FactoredLyapunov};
 use crate::riccati;
 use crate::units::power_of_two;
-use nalgebra::{Complex, DMatrix};
-use std::f64::consts::PI;
+use nalgebra::DMatrix;
 
 /// One channel of a loop: `x+ = a x + b w`, `z = c x + d w`.
 pub(crate) struct Channel<'a> {
@@ -18,6 +18,14 @@ pub(crate) struct Channel<'a> {
     pub d: &'a Enclosure,
 }
 
+/// A channel in coordinates of its own, `x = basis xi`.
+struct Frame {
+    a: DMatrix<f64>,
+    b: DMatrix<f64>,
+    c: DMatrix<f64>,
+    basis: DMatrix<f64>,
+}
+
 /// Strictness of the matrix that is sought, relative to coordinates in which it is near one; the
 /// first that proves the level is taken.
 const STRICTNESS: [f64; 3] = [1e-3, 1e-4, 1e-5];
@@ -25,25 +33,27 @@ const STRICTNESS: [f64; 3] = [1e-3, 1e-4, 1e-5];
 /// By how much a level may lie above the norm, tried in turn.
 const ALLOWANCES: [f64; 11] = [2e-4, 1e-3, 2e-3, 5e-3, 0.01, 0.02, 0.05, 0.1, 0.3, 1.0, 3.0];
 
+/// By how much the energy of a response is raised, relatively, to leave room for rounding in its proof.
+const ROUNDING: f64 = 1e-6;
+
 /// A gain below this, in the units of the certificate, is not told from zero.
 const SMALLEST: f64 = 1e-9;
 
 impl Channel<'_> {
     /// Whether the l2 gain is proved to be at most `level`.
     pub fn proves(&self, level: f64) -> bool {
-        let storages = STRICTNESS
-            .iter()
-            .filter_map(|&eps| self.storage(level, eps));
-        storages.into_iter().any(|basis| {
-            let own = FactoredLyapunov::plain(DMatrix::identity(basis.nrows(), basis.nrows()));
-            self.proves_with(
-                level,
-                &FactoredLyapunov {
-                    basis,
-                    ..own.clone()
-                },
-                None,
-            )
+        let frame = self.frame();
+        frame.is_some_and(|frame| self.proves_in(&frame, level))
+    }
+
+    /// The same in given coordinates.
+    fn proves_in(&self, frame: &Frame, level: f64) -> bool {
+        STRICTNESS.iter().any(|&strictness| {
+            let Some(basis) = self.storage_in(frame, level, strictness) else {
+                return false;
+            };
+            let core = DMatrix::identity(basis.nrows(), basis.nrows());
+            self.proves_with(level, &FactoredLyapunov { basis, core }, None)
         })
     }
 
@@ -98,72 +108,65 @@ impl Channel<'_> {
     }
 
     /// `L` with `S = L L'`, the inverse of the storage function of the bounded-real lemma at `level`
-    /// for a performance signal enlarged by `eps`.
-    pub(super) fn storage(&self, level: f64, eps: f64) -> Option<DMatrix<f64>> {
-        let first = self.frame(level)?;
-        let inverse = first.clone().try_inverse()?;
-        let a = &inverse * self.a.midpoint() * &first;
-        let b = &inverse * self.b.midpoint() / level;
-        let c = self.c.midpoint() * &first;
-        let d = self.d.midpoint() / level;
-        let inputs = b.ncols();
+    /// for a performance signal enlarged by `strictness`.
+    pub(super) fn storage(&self, level: f64, strictness: f64) -> Option<DMatrix<f64>> {
+        self.storage_in(&self.frame()?, level, strictness)
+    }
+
+    fn storage_in(&self, frame: &Frame, level: f64, strictness: f64) -> Option<DMatrix<f64>> {
+        // The disturbance in units of the level, and coordinates smaller by as much.
+        let (a, b) = (&frame.a, &frame.b);
+        let (c, d) = (&frame.c / level, self.d.midpoint() / level);
+        let (n, inputs) = b.shape();
         let room = DMatrix::identity(inputs, inputs) - d.tr_mul(&d);
         let room = room.cholesky()?.inverse();
         let feedback = &room * d.tr_mul(&c);
-        let n = a.nrows();
         let cost = c.tr_mul(&c) + c.tr_mul(&d) * &feedback;
         let storage = riccati::solve(
-            &(&a + &b * feedback),
-            &(-(&b * &room * b.transpose())),
-            &(riccati::symmetric(cost) + DMatrix::identity(n, n) * (eps * eps)),
+            &(a + b * feedback),
+            &(-(b * &room * b.transpose())),
+            &(riccati::symmetric(cost) + DMatrix::identity(n, n) * (strictness * strictness)),
         )?;
         let root = storage.cholesky()?.unpack();
-        Some(first * root.transpose().try_inverse()?)
+        Some(&frame.basis * root.transpose().try_inverse()? / level)
     }
 
-    /// Coordinates in which the disturbance, in units of `level`, reaches every direction alike.
-    fn frame(&self, level: f64) -> Option<DMatrix<f64>> {
-        let (a, b) = (self.a.midpoint(), self.b.midpoint() / level);
+    /// Coordinates in which the disturbance reaches every direction alike.
+    fn frame(&self) -> Option<Frame> {
+        let (a, b) = (self.a.midpoint(), self.b.midpoint());
         let n = a.nrows();
-        let reach = &b * b.transpose();
+        let reach = b * b.transpose();
         let floor = 1e-6 * reach.amax().max(f64::MIN_POSITIVE.sqrt());
         let gramian =
             riccati::lyapunov(&a.transpose(), &(reach + DMatrix::identity(n, n) * floor))?;
-        Some(gramian.cholesky()?.unpack())
+        let basis = gramian.cholesky()?.unpack();
+        Some(Frame {
+            a: basis.solve_lower_triangular(&(a * &basis))?,
+            b: basis.solve_lower_triangular(b)?,
+            c: self.c.midpoint() * &basis,
+            basis,
+        })
     }
 
-    /// The largest singular value of the frequency response on a grid that holds every resonance: a
-    /// lower bound of the l2 gain.
+    /// The response over frequency; `None` where a number is not finite.
+    pub fn response(&self) -> Option<Response> {
+        let parts = [self.a, self.b, self.c, self.d].map(Enclosure::midpoint);
+        let finite = parts.iter().all(|part| part.iter().all(|x| x.is_finite()));
+        let [a, b, c, d] = parts;
+        finite.then(|| Response::new(a, b, c, d))
+    }
+
+    /// A lower bound of the l2 gain, at most a hair below it (see [`Response::norm`]).
     pub fn norm(&self) -> f64 {
-        let angles = angles(self.a.midpoint());
-        angles.map(|angle| self.response(angle)).fold(0.0, f64::max)
-    }
-
-    fn response(&self, angle: f64) -> f64 {
-        let complex = |matrix: &DMatrix<f64>| matrix.map(Complex::from);
-        let n = self.a.shape().0;
-        let turn = DMatrix::from_diagonal_element(n, n, Complex::from_polar(1.0, angle));
-        let inner = (turn - complex(self.a.midpoint()))
-            .lu()
-            .solve(&complex(self.b.midpoint()));
-        let Some(inner) = inner else {
-            return f64::INFINITY;
-        };
-        let response = complex(self.c.midpoint()) * inner + complex(self.d.midpoint());
-        // The decomposition panics on what is not a number.
-        let finite = response.iter().all(|value| value.norm() < 1e150);
-        match (response.is_empty(), finite) {
-            (true, _) => 0.0,
-            (false, true) => response.singular_values().max(),
-            (false, false) => f64::INFINITY,
-        }
+        self.response().map_or(f64::INFINITY, |found| found.norm())
     }
 
     /// The least of the tried levels that is proved; `None` where none is.
     pub fn level(&self) -> Option<f64> {
         let norm = self.norm().max(SMALLEST);
+        let frame = self.frame()?;
         let mut levels = ALLOWANCES.iter().map(|allowance| norm * (1.0 + allowance));
-        levels.find(|&level| level.is_finite() && self.proves(level))
+        levels.find(|&level| level.is_finite() && self.proves_in(&frame, level))
     }
 
     /// Root of the mean square of the signal under white noise of deviation one in every input:
@@ -198,9 +201,9 @@ impl Channel<'_> {
         ]);
         let seen = own.seen(self.b);
         let energy = seen.midpoint().tr_mul(seen.midpoint());
-        let floor = 1e-9 * energy.trace() / inputs as f64 + f64::MIN_POSITIVE.sqrt();
-        let energy =
-            riccati::symmetric(energy * (1.0 + 1e-9)) + DMatrix::identity(inputs, inputs) * floor;
+        let floor = ROUNDING * energy.trace() / inputs as f64 + f64::MIN_POSITIVE.sqrt();
+        let raised = riccati::symmetric(energy * (1.0 + ROUNDING));
+        let energy = raised + DMatrix::identity(inputs, inputs) * floor;
         let trace = energy.trace() * (1.0 + 1e-12);
         let bound = Enclosure::symmetric_blocks(&[
             vec![Enclosure::exact(energy)],
@@ -215,16 +218,14 @@ impl Channel<'_> {
 
     /// `S` whose inverse solves `P = A'P A + C'C` for a signal, in units of `level`, enlarged a little.
     fn observability(&self, level: f64) -> Option<FactoredLyapunov> {
-        let first = self.frame(1.0)?;
-        let inverse = first.clone().try_inverse()?;
-        let a = &inverse * self.a.midpoint() * &first;
-        let c = self.c.midpoint() * &first / power_of_two(level);
+        let Frame { a, c, basis, .. } = self.frame()?;
+        let c = c / power_of_two(level);
         let n = a.nrows();
         let room = 1e-3 * c.norm_squared() / n as f64;
         let cost = riccati::symmetric(c.tr_mul(&c)) + DMatrix::identity(n, n) * room;
         let root = riccati::lyapunov(&a, &cost)?.cholesky()?.unpack();
         Some(FactoredLyapunov {
-            basis: first * root.transpose().try_inverse()?,
+            basis: basis * root.transpose().try_inverse()?,
             core: DMatrix::identity(n, n),
         })
     }
@@ -235,23 +236,4 @@ impl Channel<'_> {
         let mut levels = ALLOWANCES.iter().map(|allowance| norm * (1.0 + allowance));
         levels.find(|&level| level.is_finite() && self.proves_noise(level))
     }
-}
-
-/// Angles per sample at which a response is looked at: a grid from slow to fast, and the angle of
-/// every eigenvalue and its neighbourhood.
-fn angles(a: &DMatrix<f64>) -> impl Iterator<Item = f64> {
-    let slow = (0..60).map(|k| PI * 10f64.powf(-6.0 + 0.1 * f64::from(k)));
-    let even = (0..=60).map(|k| PI * f64::from(k) / 60.0);
-    let poles = a.complex_eigenvalues();
-    let resonances: Vec<f64> = poles
-        .iter()
-        .filter(|pole| pole.norm() > 1e-3)
-        .flat_map(|pole| {
-            let width = (1.0 - pole.norm()).abs();
-            let angle = pole.arg().abs();
-            [-1.0, -0.5, -0.2, 0.0, 0.2, 0.5, 1.0]
-                .map(|share| (angle + share * width).clamp(0.0, PI))
-        })
-        .collect();
-    slow.chain(even).chain(resonances)
 }

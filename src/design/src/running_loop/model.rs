@@ -15,8 +15,9 @@
 //! `e = (I - H C) (x - prior) - injection` instead, which makes `X = B~ K`.
 
 use crate::augmented::{AugmentedMode, augment, design_disturbance, readings};
-use crate::certificate::{Enclosure, scaled_gain, scaled_plant};
+use crate::certificate::{Enclosure, scaled_plant};
 use crate::matrices::dense;
+use crate::state_feedback::scaled_gain;
 use crate::{StateFeedback, Units};
 use ftc_control::Matrix;
 use ftc_control::parameters::{Observer, ObserverKind};

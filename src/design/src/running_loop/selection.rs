@@ -117,18 +117,19 @@ fn merit(
     };
     for (mode, reference) in references.iter().enumerate() {
         let model = models.healthy(mode, observer);
-        if ftc_plant::spectral_radius(model.a.midpoint()) >= 1.0 {
-            return None;
-        }
         let channel = Channel {
             a: &model.a,
             b: &model.disturbance,
             c: &model.performance,
             d: &model.direct,
         };
+        let response = channel.response()?;
+        if response.spectral_radius() >= 1.0 {
+            return None;
+        }
         let commands = command_deviation(&model, &deviations)?;
         let noise = commands.iter().map(|c| c * c).sum::<f64>().sqrt();
-        merit.excess = merit.excess.max(channel.norm() / reference);
+        merit.excess = merit.excess.max(response.norm() / reference);
         merit.noise = merit.noise.max(noise);
     }
     Some(merit)

@@ -4,10 +4,10 @@ use super::gain::Channel;
 use super::model::Loop;
 use super::{Claim, Scaled, Subject, SwitchingGain, prove_switching};
 use crate::Lyapunov;
+use crate::blocks::{BlockKind, BlockName};
 use crate::certificate::FactoredLyapunov;
 use crate::lmi::{Inequality, Problem, Variable};
 use crate::riccati;
-use crate::verdict::{BlockKind, BlockName};
 use nalgebra::DMatrix;
 
 /// The most unknowns for which the inequality is solved; beyond it only the gain of each mode is

@@ -19,8 +19,8 @@
 use super::Subject;
 use super::model::Loop;
 use crate::Lyapunov;
+use crate::blocks::{BlockKind, BlockName};
 use crate::certificate::{CertificateError, Coordinates, Enclosure, FactoredLyapunov, require};
-use crate::verdict::{BlockKind, BlockName};
 use nalgebra::DMatrix;
 use serde::{Deserialize, Serialize};
 

@@ -3,10 +3,10 @@
 use super::Subject;
 use super::transfer::{Step, TRANSFER_DECAY, TransferCertificate, due, prove, steps};
 use crate::Lyapunov;
+use crate::blocks::{BlockKind, BlockName};
 use crate::certificate::{FactoredLyapunov, largest_ratio};
 use crate::lmi::{Inequality, Problem};
 use crate::riccati;
-use crate::verdict::{BlockKind, BlockName};
 use nalgebra::DMatrix;
 
 /// Shares of what the slowest rate leaves to 1 that are tried as decay of the function.

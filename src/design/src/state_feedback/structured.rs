@@ -13,14 +13,16 @@
 
 use super::frame::Part;
 use crate::augmented::AugmentedMode;
+use crate::blocks::{BlockKind, BlockName};
 use crate::certificate::FactoredLyapunov;
 use crate::interior_point::{
     Block, Bound, Congruence, Point, Problem, Product, Settings, Solution, maximise,
 };
 use crate::lmi::Margin;
+use crate::matrices::pseudo_inverse;
 use crate::solver::{Run, Step};
-use crate::verdict::{BlockKind, BlockName, SolverFailure};
-use crate::{ControlSpec, Lyapunov, pseudo_inverse};
+use crate::verdict::SolverFailure;
+use crate::{ControlSpec, Lyapunov};
 use nalgebra::DMatrix;
 
 /// How far, as a factor, Lyapunov matrices may be from the identity on average.

@@ -6,11 +6,12 @@
 
 use super::advice;
 use super::frame::{Frame, Part};
+use super::proof::provable_dwell;
 use super::structured;
 use super::theorem;
 use super::{ModeGains, REJECTION, StateFeedback};
 use crate::augmented::{AugmentedMode, augment, scaled};
-use crate::certificate::{ControlCertificate, FactoredLyapunov, provable_dwell};
+use crate::certificate::{ControlCertificate, FactoredLyapunov};
 use crate::lmi::Margin;
 use crate::units::other_scaling;
 use crate::verdict::{DesignError, SolverFailure, infeasible};

@@ -2,10 +2,12 @@
 
 use super::frame::Part;
 use crate::augmented::AugmentedMode;
+use crate::blocks::{BlockKind, BlockName};
 use crate::certificate::FactoredLyapunov;
 use crate::lmi::{Affine, Inequality, Margin, Problem, Variable, trace};
-use crate::verdict::{BlockKind, BlockName, SolverFailure};
-use crate::{ControlSpec, Lyapunov, pseudo_inverse};
+use crate::matrices::pseudo_inverse;
+use crate::verdict::SolverFailure;
+use crate::{ControlSpec, Lyapunov};
 use nalgebra::DMatrix;
 
 /// The unknowns of one mode: `S`, `G + G' - S` as an expression, `G` and `R = K~ G`.

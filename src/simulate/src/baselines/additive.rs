@@ -2,7 +2,7 @@
 
 use ftc_control::ControllerParameters;
 use ftc_control::parameters::Compensation;
-use ftc_design::assembly::{feedback, scaling};
+use ftc_design::assembly::feedback;
 use ftc_design::{ControlSpec, Design, DesignError, Objective, state_feedback};
 
 /// The same controller with the gains of T1 (decay only, no attenuation of the disturbance) and
@@ -21,7 +21,7 @@ pub fn additive(design: &Design) -> Result<ControllerParameters, DesignError> {
     };
     let ours = &design.controller.feedback;
     let plant = &design.plant;
-    let control = state_feedback::synthesise(plant, &spec, &scaling(&design.signals))?;
+    let control = state_feedback::synthesise(plant, &spec, &design.signals.scaling())?;
     let mut parameters = design.parameters();
     parameters.compensation = Compensation::Additive;
     parameters.feedback = feedback(
