@@ -294,7 +294,7 @@ fn estimator(request: &Request, dims: Dimensions) -> Result<Estimator, String> {
 
 /// Standard deviation of each sensor's noise (p) for the state-based estimator: that of the scenario, and
 /// never below what the smallest threshold stands for.
-fn sensor_noise(given: &[f64], thresholds: &[f64]) -> Vec<f64> {
+pub(crate) fn sensor_noise(given: &[f64], thresholds: &[f64]) -> Vec<f64> {
     let sensors = given.iter().zip(thresholds);
     sensors
         .map(|(&noise, &threshold)| match noise > 0.0 {

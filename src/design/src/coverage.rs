@@ -247,7 +247,8 @@ fn hypotheses_fit(design: &Design) -> bool {
         harmonics: found.angles.len(),
         amplitude: Some(found.disturbance_load.clone()),
     });
-    let mut derived = spec.settings(plant, &design.signals, known.as_ref());
+    let noise = assembly::sensor_noise(&design.scenario.noise, &estimator.thresholds);
+    let mut derived = spec.settings(plant, &design.signals, noise, known.as_ref());
     let turns = derived.angles.iter().zip(&found.angles);
     let same_turns = turns.clone().all(|(a, b)| (a - b).abs() <= 1e-12 * a.abs());
     derived.angles.clone_from(&found.angles);

@@ -268,7 +268,7 @@ impl Bank {
             }
         }
         for q in 0..p {
-            if has(free, q) && state.evidence[q] > FREEZING {
+            if has(free, q) && state.evidence[q] > FREEZING && slot == state.live.first() {
                 let value = score
                     + self.prices.stuck
                     + state.evidence[q]
