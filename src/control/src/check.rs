@@ -266,6 +266,7 @@ fn hypotheses(settings: &Hypotheses, sizes: Sizes) -> Checked {
         ("authority", &settings.authority, p),
         ("input_load", &settings.input_load, m),
         ("disturbance_load", &settings.disturbance_load, s),
+        ("disturbance_walk", &settings.disturbance_walk, s),
         (
             "disturbance_size",
             &settings.disturbance_size,

@@ -259,8 +259,10 @@ pub struct Hypotheses {
     pub disturbance_load: Vec<f64>,
     /// How far a load on the states themselves displaces them at rest (n), state units.
     pub state_load: Vec<f64>,
-    /// How far a load wanders per sample, relative to the size of its jumps.
+    /// How far a load on an input or a state wanders per sample, relative to the size of its jumps.
     pub load_walk: f64,
+    /// How far a load on each disturbance channel wanders per sample (s), its units.
+    pub disturbance_walk: Vec<f64>,
     /// Relative error of the entries of the plant's matrices.
     pub model_error: f64,
     /// Standard deviation of the relative error of an input's gain.

@@ -363,7 +363,6 @@ impl Hypothesis {
             settings.model_error
         };
         let error = error * error;
-        let walk = settings.load_walk * settings.load_walk;
         // The model's error acts as a load that moves as the state and the input move.
         let (moved, _) = scratch.split_at_mut(n);
         for ((out, before), &x) in moved.iter_mut().zip(&mut self.before).zip(&self.z) {
@@ -382,8 +381,8 @@ impl Hypothesis {
             let k = load + layout.state_load() + i;
             self.cov[k * size + k] += error * sum;
         }
-        for (k, deviation) in (load..gain).zip(&model.load_size) {
-            self.cov[k * size + k] += walk * deviation * deviation;
+        for (k, wander) in (load..gain).zip(&model.load_walk) {
+            self.cov[k * size + k] += wander * wander;
         }
         for k in gain..fault {
             self.cov[k * size + k] += settings.gain_walk * settings.gain_walk;

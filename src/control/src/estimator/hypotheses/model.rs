@@ -83,6 +83,8 @@ pub struct ModeModel {
     pub g: Vec<f64>,
     /// Standard deviation of a jump of each load.
     pub load_size: Vec<f64>,
+    /// How far each load wanders per sample.
+    pub load_walk: Vec<f64>,
     /// What jumps of loads may do: all of them at once first, then each source on its own.
     pub jumps: Vec<Jump>,
     /// `C B` (p x m).
@@ -104,7 +106,7 @@ impl ModeModel {
         e: Vec<f64>,
         f: Vec<f64>,
         point: (&[f64], &[f64], &[f64]),
-        (g, load_size): (Vec<f64>, Vec<f64>),
+        (g, load_size, load_walk): (Vec<f64>, Vec<f64>, Vec<f64>),
         bias: Vec<f64>,
         b_inverse: Vec<f64>,
     ) -> Self {
@@ -165,6 +167,7 @@ impl ModeModel {
             output_offset,
             g,
             load_size,
+            load_walk,
             jumps,
             cb,
             bias,

@@ -71,14 +71,14 @@ fn left_inverse(b: &[f64], n: usize, m: usize) -> Vec<f64> {
     out
 }
 
-/// What loads do to the states (n x loads), and how large they are: on each input, each channel of the
+/// What loads do to the states (n x loads), how large they are, and how far they wander: on each input, each channel of the
 /// disturbance, each state.
 fn loads(
     layout: Layout,
     mode: &Described,
     channels: &Channels,
     settings: &Hypotheses,
-) -> (Vec<f64>, Vec<f64>) {
+) -> (Vec<f64>, Vec<f64>, Vec<f64>) {
     let Layout { n, m, s, .. } = layout;
     let effect = Matrix::from_fn(n, layout.loads(), |i, k| match k {
         k if k < m => mode.b.get(i, k).unwrap_or(0.0),
@@ -95,7 +95,9 @@ fn loads(
         }
         sizes.push(libm::sqrt(sum));
     }
-    (rows(&effect), sizes)
+    let mut walks: Vec<f64> = sizes.iter().map(|size| settings.load_walk * size).collect();
+    walks[m..m + s].copy_from_slice(&settings.disturbance_walk);
+    (rows(&effect), sizes, walks)
 }
 
 fn model(
