@@ -63,13 +63,16 @@ const INPUT_LOAD: f64 = 0.2;
 const STATE_LOAD: f64 = 0.03;
 /// Wander of a load per sample relative to the size of its jumps.
 const LOAD_WALK: f64 = 5e-3;
+/// Wander of a disturbance of known size per sample, relative to that size: what a sine with a period of
+/// ninety samples does at most.
+const DISTURBANCE_WALK: f64 = 0.07;
 /// Relative error of an input's gain, and its wander per sample.
 const GAIN_ERROR: f64 = 0.3;
 const GAIN_WALK: f64 = 1e-4;
 /// Relative error of the disturbance's period.
 const PERIOD_ERROR: f64 = 0.05;
 /// How far the disturbance may move an output where its size is not known, relative to nominal.
-const DISTURBANCE: f64 = 0.3;
+const DISTURBANCE: f64 = 0.05;
 /// Error of the state at the start relative to its nominal value.
 const START: f64 = 3e-3;
 
@@ -85,10 +88,14 @@ impl HypothesesSpec {
     ) -> Hypotheses {
         let scaling = signals.scaling();
         let outputs = &signals.outputs;
-        let disturbance = known
+        let amplitude = known
             .and_then(|known| known.amplitude.clone())
-            .filter(|sizes| sizes.iter().all(|&size| size > 0.0))
-            .unwrap_or_else(|| unknown_disturbance(plant, &scaling.outputs));
+            .filter(|sizes| sizes.iter().all(|&size| size > 0.0));
+        let walk = match amplitude {
+            Some(_) => DISTURBANCE_WALK,
+            None => LOAD_WALK,
+        };
+        let disturbance = amplitude.unwrap_or_else(|| unknown_disturbance(plant, &scaling.outputs));
         let angles = known.map_or_else(Vec::new, |known| known.angles(plant.sample_time));
         let waves = disturbance
             .iter()
@@ -115,6 +122,7 @@ impl HypothesesSpec {
                 .clone()
                 .unwrap_or_else(|| scaled(&scaling.inputs, INPUT_LOAD)),
             disturbance_size: waves.collect(),
+            disturbance_walk: scaled(&disturbance, walk),
             disturbance_load: disturbance,
             state_load: scaled(&scaling.states, STATE_LOAD),
             load_walk: LOAD_WALK,
@@ -133,6 +141,11 @@ impl HypothesesSpec {
             ambiguous: self.ambiguous,
         }
     }
+}
+
+/// Whether these sizes and rates were made for a disturbance of known amplitude.
+pub(crate) fn amplitude_is_known(settings: &Hypotheses) -> bool {
+    settings.disturbance_walk == scaled(&settings.disturbance_load, DISTURBANCE_WALK)
 }
 
 fn scaled(values: &[f64], factor: f64) -> Vec<f64> {

@@ -63,7 +63,7 @@ pub const FEEDFORWARD: bool = true;
 /// `observer.kind`
 pub const OBSERVER: ObserverKind = ObserverKind::Auto;
 /// `estimator.method`
-pub const ESTIMATOR: EstimatorMethod = EstimatorMethod::Observer;
+pub const ESTIMATOR: EstimatorMethod = EstimatorMethod::Reference;
 /// `estimator.database`
 pub const DATABASE: DatabaseSource = DatabaseSource::Commission;
 /// `estimator.sigmas`
