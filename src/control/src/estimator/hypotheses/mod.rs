@@ -437,7 +437,7 @@ impl Bank {
                 + dot(&model.a[i * n..(i + 1) * n], &state.own)
                 + dot(&model.e[i * d..(i + 1) * d], &z[n..n + d]);
             for j in 0..m {
-                sum += model.b[i * m + j] * u[j] * (1.0 + z[self.layout.gain() + j]);
+                sum += model.b[i * m + j] * u[j];
             }
             state.scratch[i] = crate::kernel::bounded(sum);
         }
