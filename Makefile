@@ -14,10 +14,11 @@ TOOLS := $(CURDIR)/target/tools
 .PHONY: build fmu-linux64 fmu-all wheel test-wheel compare-platforms test test-rust test-python browser demo bench fuzz soak memcheck threadcheck lint package clean
 
 # The program, and the FMU binaries by themselves with the profile meant for them: built with the
-# whole workspace they would carry the solver's symbols along.
+# whole workspace they would carry the solver's symbols along. No path of this machine is in them.
 build:
 	cargo build --release --package ftc-fmu
-	cargo build --profile fmu --package ftc-controller-fmu --package ftc-plant-fmu
+	CARGO_ENCODED_RUSTFLAGS="$$(tools/platforms/remap.sh)" \
+		cargo build --profile fmu --package ftc-controller-fmu --package ftc-plant-fmu
 	tools/platforms/native.sh
 
 # FMU binaries beyond those for this machine; `ftc-fmu export` packs whatever is built and is not
@@ -87,6 +88,7 @@ demo: build $(VENV)/ready
 bench: build $(VENV)/ready
 	cargo bench --workspace
 	PYTHONPATH=tests/support $(IN_VENV)python tests/cvxpy/design_time.py --write docs/performance.md
+	PYTHONPATH=tests/support:tests/fmpy $(IN_VENV)python tests/support/speed.py --write docs/performance.md
 
 # Fuzzing needs a C++ compiler; each of TARGETS runs for SECONDS, ABREAST of them side by side.
 SECONDS ?= 30

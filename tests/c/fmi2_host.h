@@ -41,30 +41,39 @@ typedef struct {
     void *componentEnvironment;
 } fmi2CallbackFunctions;
 
-/* name, result, arguments: the functions that the host calls */
-#define FMI2_CALLED(X)                                                                          \
+/* name, result, arguments: the functions that a loop needs */
+#define FMI2_LOOP(X)                                                                            \
     X(GetTypesPlatform, const char *, (void))                                                   \
     X(GetVersion, const char *, (void))                                                         \
     X(Instantiate, void *, (const char *, int, const char *, const char *,                      \
                             const fmi2CallbackFunctions *, int, int))                           \
     X(FreeInstance, void, (void *))                                                             \
-    X(SetDebugLogging, fmi2Status, (void *, int, size_t, const char *const[]))                  \
     X(SetupExperiment, fmi2Status, (void *, int, double, double, int, double))                  \
     X(EnterInitializationMode, fmi2Status, (void *))                                            \
     X(ExitInitializationMode, fmi2Status, (void *))                                             \
-    X(Terminate, fmi2Status, (void *))                                                          \
-    X(Reset, fmi2Status, (void *))                                                              \
     X(GetReal, fmi2Status, (void *, const unsigned[], size_t, double[]))                        \
     X(SetReal, fmi2Status, (void *, const unsigned[], size_t, const double[]))                  \
+    X(DoStep, fmi2Status, (void *, double, double, int))
+
+/* the others that the host calls */
+#define FMI2_MORE(X)                                                                            \
+    X(SetDebugLogging, fmi2Status, (void *, int, size_t, const char *const[]))                  \
+    X(Terminate, fmi2Status, (void *))                                                          \
+    X(Reset, fmi2Status, (void *))                                                              \
     X(GetFMUstate, fmi2Status, (void *, void **))                                               \
     X(SetFMUstate, fmi2Status, (void *, void *))                                                \
     X(FreeFMUstate, fmi2Status, (void *, void **))                                              \
     X(SerializedFMUstateSize, fmi2Status, (void *, void *, size_t *))                           \
     X(SerializeFMUstate, fmi2Status, (void *, void *, char[], size_t))                          \
     X(DeSerializeFMUstate, fmi2Status, (void *, const char[], size_t, void **))                 \
-    X(DoStep, fmi2Status, (void *, double, double, int))                                        \
     X(GetRealStatus, fmi2Status, (void *, int, double *))                                       \
     X(SetTime, fmi2Status, (void *, double))
+
+#ifdef FMI2_CALLED_ONLY
+#define FMI2_CALLED(X) FMI2_LOOP(X)
+#else
+#define FMI2_CALLED(X) FMI2_LOOP(X) FMI2_MORE(X)
+#endif
 
 /* the other functions of the standard, which must be there too */
 #define FMI2_PRESENT(X)                                                                         \
@@ -91,7 +100,7 @@ static void *fmi2_symbol(void *library, const char *name) {
     return symbol;
 }
 
-/* Loads a library and all 44 functions. */
+/* Loads a library and all 44 functions; with FMI2_CALLED_ONLY defined, those that a loop needs. */
 static Fmu fmi2_load(const char *path) {
     Fmu fmu;
     fmu.library = dlopen(path, RTLD_NOW | RTLD_LOCAL);
@@ -105,9 +114,11 @@ static Fmu fmi2_load(const char *path) {
     memcpy(&fmu.name, &symbol, sizeof symbol);
     FMI2_CALLED(FMI2_LOAD)
 #undef FMI2_LOAD
+#ifndef FMI2_CALLED_ONLY
 #define FMI2_FIND(name) fmi2_symbol(fmu.library, "fmi2" #name);
     FMI2_PRESENT(FMI2_FIND)
 #undef FMI2_FIND
+#endif
     return fmu;
 }
 

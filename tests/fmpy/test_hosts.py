@@ -5,6 +5,7 @@ from __future__ import annotations
 import zipfile
 from typing import TYPE_CHECKING
 
+import fmpy
 import numpy as np
 import pytest
 from fmpy.ssp.simulation import simulate_ssp
@@ -82,6 +83,17 @@ def test_readings_held_within_a_coarse_step_accuse_nobody(example_case: Callable
         np.testing.assert_array_equal(flagged, controller.get("fault_real"))
 
 
+def test_fmpy_simulate_accuses_no_sensor(example_case: Callable[[str], Case], capfd: pytest.CaptureFixture) -> None:
+    """`fmpy simulate` on the converter's controller: no inputs, steps of four samples, no mode told."""
+    result = fmpy.simulate_fmu(str(example_case("converter").fmus.controller))
+    flags = [name for name in result.dtype.names if name.startswith("fault")]
+    assert len(flags) == 4
+    assert not any(result[name].any() for name in flags)
+    heard = capfd.readouterr().out
+    assert heard.count("mode is 0, not told yet") == 1
+    assert heard.count("ran on these old inputs") == 1
+
+
 def test_fmpy_opens_the_package_and_closes_the_loop(example_case: Callable[[str], Case]) -> None:
     """`simulate_ssp` sets every connector to 0 first and steps in parallel: the loop tracks as the native one does.
 
@@ -141,3 +153,32 @@ def test_units_are_declared_for_importers(example_case: Callable[[str], Case]) -
         structure = package.read("SystemStructure.ssd").decode()
     assert structure.count('unit="degC"') >= 10
     assert '<ssc:BaseUnit K="1" offset="273.15"/>' in structure
+
+
+@pytest.mark.parametrize(
+    ("example", "parallel", "told"),
+    [
+        ("paper", False, None),
+        ("paper", True, "one sample more of delay"),
+        ("paper_latency", True, None),
+        ("paper_latency", False, "one sample less of delay"),
+        ("tank", False, None),
+    ],
+)
+def test_a_wrong_coupling_is_noticed(
+    example_case: Callable[[str], Case],
+    capfd: pytest.CaptureFixture,
+    example: str,
+    *,
+    parallel: bool,
+    told: str | None,
+) -> None:
+    """The controller says once that the readings fit another delay, and nothing where the coupling is right.
+
+    promise: wrong-delay
+    """
+    case = example_case(example)
+    fmu_loop.run(case.fmus, 900, fmu_loop.Schedule(parallel=parallel))
+    heard = capfd.readouterr().out
+    assert heard.count("of delay in the loop than the design allows for") == (told is not None)
+    assert (told or "") in heard

@@ -21,7 +21,7 @@ build() {
     local target=$1 glibc=$2
     shift 2
     if has_library_for "$target"; then
-        "$@" "${packages[@]}" --target "$target$glibc"
+        CARGO_ENCODED_RUSTFLAGS=$(tools/platforms/remap.sh "${linking[@]}") "$@" "${packages[@]}" --target "$target$glibc"
         built=target/$target/fmu
         return
     fi
@@ -32,7 +32,8 @@ build() {
         export RUSTC_BOOTSTRAP=1
         standard=(-Zbuild-std=std,panic_unwind)
     fi
-    "$@" "${packages[@]}" --target "$target$glibc" --target-dir target/platforms/build "${standard[@]}"
+    CARGO_ENCODED_RUSTFLAGS=$(tools/platforms/remap.sh "${linking[@]}") \
+        "$@" "${packages[@]}" --target "$target$glibc" --target-dir target/platforms/build "${standard[@]}"
     unset RUSTC RUSTC_BOOTSTRAP
     built=target/platforms/build/$target/fmu
 }
@@ -48,6 +49,8 @@ pack() {
 }
 
 for platform in "$@"; do
+    # Flags of rustc for this platform alone.
+    linking=()
     case $platform in
     linux64)
         build x86_64-unknown-linux-gnu .2.17 cargo zigbuild
@@ -60,7 +63,7 @@ for platform in "$@"; do
     win64)
         # Everything but the system's own DLLs goes into the library.
         export CARGO_TARGET_X86_64_PC_WINDOWS_GNU_LINKER=x86_64-w64-mingw32-gcc
-        export CARGO_TARGET_X86_64_PC_WINDOWS_GNU_RUSTFLAGS="-C target-feature=+crt-static"
+        linking=(-Ctarget-feature=+crt-static)
         build x86_64-pc-windows-gnu "" cargo build
         pack win64 "" dll
         ;;

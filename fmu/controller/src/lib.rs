@@ -9,7 +9,7 @@ use fmu_abi::{
     Readiness, Refusal, Slave, Values, nearest_mode, require_finite, resource, selected_mode,
 };
 use ftc_control::estimator::hypotheses::{Sensors, has};
-use ftc_control::{Change, Compensate, Controller, ControllerState, Sample};
+use ftc_control::{Change, Compensate, Controller, ControllerState, Delay, Sample};
 use model_description::{CONTROLLER, DESIGN_FILE, Interface, Role, Span, VariableTable};
 use std::path::Path;
 
@@ -183,6 +183,27 @@ impl Slave for ControllerFmu {
         self.controller.tick(state, &self.sample(values, k)?);
         self.publish(state, values);
         Ok(())
+    }
+
+    fn notice(&self, state: &ControllerState) -> Option<&'static str> {
+        let latency = self.controller.parameters().feedback.latency;
+        let found = self.controller.found_delay(state)?;
+        Some(match (latency, found) {
+            (0, _) => {
+                "the readings fit one sample more of delay in the loop than the design allows for \
+                 (latency = 0): step the controller before the plant and hand its command over in \
+                 between, or design with latency = 1 for a master that steps both in parallel"
+            }
+            (_, Delay::Shorter) => {
+                "the readings fit one sample less of delay in the loop than the design allows for \
+                 (latency = 1): step controller and plant in parallel, or design with latency = 0 \
+                 for a master that steps the controller first"
+            }
+            (_, Delay::Longer) => {
+                "the readings fit one sample more of delay in the loop than the design allows for \
+                 (latency = 1): hand every signal over at every sample"
+            }
+        })
     }
 
     const PROVIDES_DIRECTIONAL_DERIVATIVE: bool = true;

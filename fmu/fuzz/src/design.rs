@@ -21,6 +21,8 @@ pub enum Edit {
     Number(u16, i16),
     /// The same, with a number of any size.
     Real(u16, f64),
+    /// The same, with a whole number of any size: a length that somebody asks memory for.
+    Size(u16, u64),
     /// An element is taken out.
     Without(u16),
     /// A byte is replaced.
@@ -52,6 +54,10 @@ fn edit(text: &mut String, edit: &Edit) {
         Edit::Real(which, value) => {
             let range = number(text, which);
             text.replace_range(range, &format!("{value:e}"));
+        }
+        Edit::Size(which, value) => {
+            let range = number(text, which);
+            text.replace_range(range, &value.to_string());
         }
         Edit::Without(which) => {
             let range = number(text, which);

@@ -197,8 +197,62 @@ fn observer(observer: &Observer, sizes: Sizes) -> Checked {
     Ok(())
 }
 
+/// Longest response and longest window, in samples.
+const LONGEST: usize = 100_000;
+
+/// Most numbers in a window: its length times inputs times response length.
+const LARGEST_WINDOW: usize = 10_000_000;
+
+/// Most harmonics of a known disturbance.
+const MOST_HARMONICS: usize = 256;
+
+/// Most states that the hypotheses of the state-based method estimate together.
+const LARGEST_JOINT_STATE: usize = 1000;
+
+impl Estimator {
+    /// Whether the numbers that say how much memory a state takes are practical, so that nobody's
+    /// memory is asked for by a number alone; for a plant with this many `inputs`.
+    ///
+    /// # Errors
+    /// The field that is too large.
+    pub fn check_memory(&self, inputs: usize) -> Result<(), ControllerError> {
+        let window = self.window.saturating_mul(inputs);
+        let harmonics = self.harmonics.as_ref().map_or(0, |known| known.count);
+        for (field, found, most, rule) in [
+            (
+                "estimator.response_length",
+                self.response_length,
+                LONGEST,
+                "must be at most 100000 samples",
+            ),
+            (
+                "estimator.window",
+                self.window,
+                LONGEST,
+                "must be at most 100000 samples",
+            ),
+            (
+                "estimator.window",
+                window.saturating_mul(self.response_length),
+                LARGEST_WINDOW,
+                "must be smaller: its length times inputs times response length at most 1e7",
+            ),
+            (
+                "estimator.harmonics.count",
+                harmonics,
+                MOST_HARMONICS,
+                "must be at most 256",
+            ),
+        ] {
+            range(found <= most, field, rule)?;
+        }
+        Ok(())
+    }
+}
+
 fn estimator(estimator: &Estimator, sizes: Sizes) -> Checked {
     let p = sizes.outputs;
+    estimator.check_memory(sizes.inputs)?;
     vector("estimator.thresholds", &estimator.thresholds, p)?;
     vector("estimator.largest_fault", &estimator.largest_fault, p)?;
     range(
@@ -248,6 +302,12 @@ fn hypotheses(settings: &Hypotheses, sizes: Sizes) -> Checked {
         sizes.modes,
     )?;
     let s = settings.channels.first().map_or(0, |first| first.e.ncols());
+    let waves = (2 * s).saturating_mul(settings.angles.len());
+    range(
+        waves.saturating_add(2 * n + m + p) <= LARGEST_JOINT_STATE,
+        "estimator.hypotheses",
+        "must estimate at most 1000 states together: twice the plant's, inputs, outputs and waves",
+    )?;
     for channels in &settings.channels {
         shape(
             "estimator.hypotheses.channels.e".into(),

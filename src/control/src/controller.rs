@@ -7,6 +7,7 @@ use alloc::vec::Vec;
 pub use derivative::Change;
 
 use super::compensation::{self, AdditiveControl};
+use super::delay::{Commands, Delay, DelayWatch};
 use super::estimator::hypotheses::{Bank, BankState};
 use super::estimator::{EstimatorState, Observation};
 use super::integrator;
@@ -102,6 +103,8 @@ pub struct ControllerState {
     repetition: Repetition,
     /// State observer.
     pub observer: ObserverState,
+    /// Whether the loop has the delay of the design.
+    delay: DelayWatch,
     /// The model's own run while no reading can be judged.
     open_loop: OpenLoop,
     /// Fault estimator.
@@ -134,8 +137,8 @@ pub struct ControllerState {
 
 crate::state!(ControllerState {
     parts: [
-        repetition, observer, open_loop, estimator, bank, integral, additive, command, corrected,
-        acting, deviation, offset, excess, substitute, no_fault
+        repetition, observer, delay, open_loop, estimator, bank, integral, additive, command,
+        corrected, acting, deviation, offset, excess, substitute, no_fault
     ],
     constants: [],
     counters: [mode, since]
@@ -218,6 +221,12 @@ impl Controller {
             mode: None,
             repetition: Repetition::new(dims.outputs),
             observer: ObserverState::new(&point.x0, dims.outputs),
+            delay: DelayWatch::new(
+                &point.x0,
+                &point.u0,
+                dims.outputs,
+                self.parameters.feedback.latency,
+            ),
             open_loop: OpenLoop::new(&point.x0, dims.outputs),
             estimator: EstimatorState::new(&self.parameters.estimator, &point.u0, dims.outputs),
             bank: self.bank.as_ref().map(|bank| bank.start(mode)),
@@ -284,6 +293,33 @@ impl Controller {
         }
         self.command(state, mode, point, sample);
         self.advance(state, model, mode, sample);
+        self.watch_delay(state, model, (left, mode), sample.measurement);
+    }
+
+    /// The delay that the readings fit, if it is another than the design's.
+    pub fn found_delay(&self, state: &ControllerState) -> Option<Delay> {
+        state.delay.found()
+    }
+
+    /// Runs the observer under other delays of the command.
+    fn watch_delay(
+        &self,
+        state: &mut ControllerState,
+        model: &ObservedMode,
+        modes: (usize, usize),
+        y: &[f64],
+    ) {
+        let observer = &self.parameters.observer;
+        let Some(gain) = observer.gains.get(modes.1) else {
+            return;
+        };
+        let commands = Commands {
+            designed: &state.acting,
+            newest: &state.command,
+        };
+        state
+            .delay
+            .watch((observer, gain), model, modes, y, commands);
     }
 
     /// Whether a state has the sizes of this controller; one that came as bytes may not.

@@ -82,12 +82,27 @@ pub fn dot(left: &[f64], right: &[f64]) -> f64 {
     left.iter().zip(right).map(|(l, r)| l * r).sum()
 }
 
+/// Inner product in four sums side by side, for long vectors: no addition waits for the one before
+/// it. Its order is fixed too.
+pub fn long_dot(left: &[f64], right: &[f64]) -> f64 {
+    let (left, left_rest) = left.as_chunks::<4>();
+    let (right, right_rest) = right.as_chunks::<4>();
+    let mut sums = [0.0; 4];
+    for (l, r) in left.iter().zip(right) {
+        for (sum, (l, r)) in sums.iter_mut().zip(l.iter().zip(r)) {
+            *sum += l * r;
+        }
+    }
+    (sums[0] + sums[2]) + (sums[1] + sums[3]) + dot(left_rest, right_rest)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
     use nalgebra::{DMatrix, DVector};
     use proptest::prelude::*;
     use std::vec;
+    use std::vec::Vec;
 
     proptest! {
         #[test]
@@ -104,6 +119,13 @@ mod tests {
             for (got, want) in out.iter().zip(expected.iter()) {
                 prop_assert!((got - want).abs() <= 1e-12 * (1.0 + want.abs()));
             }
+        }
+
+        #[test]
+        fn a_long_product_is_a_product(pairs in prop::collection::vec((-10.0..10.0f64, -10.0..10.0f64), 0..40)) {
+            let (left, right): (Vec<f64>, Vec<f64>) = pairs.into_iter().unzip();
+            let (long, plain) = (long_dot(&left, &right), dot(&left, &right));
+            prop_assert!((long - plain).abs() <= 1e-11);
         }
 
         #[test]

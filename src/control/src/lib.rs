@@ -54,6 +54,7 @@ extern crate alloc;
 mod check;
 pub mod compensation;
 pub mod controller;
+pub mod delay;
 mod error;
 pub mod estimator;
 pub mod integrator;
@@ -66,6 +67,7 @@ pub mod repetition;
 pub mod state;
 
 pub use controller::{Change, Compensate, Controller, ControllerState, Sample};
+pub use delay::Delay;
 pub use error::{ControllerError, SampleError};
 pub use matrix::{Matrix, UnequalRows};
 pub use parameters::ControllerParameters;

@@ -10,6 +10,7 @@ use super::{
     Signals, check_controllable, synthesise_with,
 };
 use crate::running_loop::{TRANSFER_DECAY, TransferCertificate};
+use crate::work::Work;
 use ftc_control::parameters::{
     Compensation, Estimator, EstimatorMethod, Harmonics, Limits, Predictor, StateFeedback, Transfer,
 };
@@ -144,6 +145,8 @@ pub fn assemble_with(request: Request, run: &Run) -> Result<Design, Failure> {
     let dims = Dimensions::check(&request.plant).map_err(DesignError::Request)?;
     let asked = request.control.check(dims);
     asked.map_err(DesignError::Request)?;
+    let work = Work::new(dims, request.plant.modes.len(), &request.control);
+    work.check(&request.control).map_err(DesignError::Request)?;
     let estimator = estimator(&request, dims).map_err(DesignError::Request)?;
     let scaling = request.signals.scaling();
     check_controllable(&request.plant, &request.control, &scaling).map_err(DesignError::Request)?;

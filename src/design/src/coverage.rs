@@ -30,7 +30,7 @@ pub const UNCOVERED: [&str; 5] = [
     "the coefficients of the fault estimator's predictors and its thresholds, debounce and learning (the claims hold \
      while no estimate is taken out of the loop)",
     "whether gamma is the least possible",
-    "the machine code of the binaries",
+    "the machine code of the binaries, beyond the ticks for which the one of this machine is run",
 ];
 
 /// Derives again what can be, and checks the rest against its relations.

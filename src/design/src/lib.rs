@@ -61,6 +61,7 @@ mod units;
 mod verdict;
 #[cfg(feature = "solver")]
 pub mod warnings;
+pub mod work;
 
 pub use blocks::{BlockKind, BlockName};
 pub use certificate::{CertificateError, ControlCertificate};

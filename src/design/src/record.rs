@@ -179,6 +179,8 @@ impl Design {
                 ));
             }
         }
+        let memory = self.controller.estimator.check_memory(dims.inputs);
+        memory.map_err(|error| format!("the design is not one of ours: {error}"))?;
         if tracked.iter().any(|&row| row >= dims.outputs) {
             return Err(format!(
                 "the design tracks an output beyond its {}",

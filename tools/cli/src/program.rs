@@ -23,7 +23,8 @@ use design_file::Loaded;
 use failure::Failure;
 use ftc_design::assembly::Request;
 use ftc_design::warnings::LoggedMovement;
-use ftc_design::{Design, Run, Solver, Step};
+use ftc_design::work::Work;
+use ftc_design::{Design, Lyapunov, Run, Solver, Step};
 use package::output::Staging;
 use progress::Progress;
 use report::{summary, warnings};
@@ -86,7 +87,9 @@ enum Command {
     /// run are those that were proved, then proves every inequality with rounding accounted for:
     /// stability under arbitrary switching or beyond a dwell time, decay, and gamma per mode.
     /// Of the binaries it checks that there is one, and of each the platform and the functions it
-    /// offers; what their machine code does is not proved.
+    /// offers. A controller's binary for this machine is run, in a process of its own, for some hundred
+    /// ticks of random signals, and must give to the bit what this program's controller gives; what its
+    /// machine code does beyond them is not proved. With --no-run no code of the FMU is executed.
     #[command(after_help = EXIT_CODES)]
     Verify {
         /// FMU that ftc-fmu export wrote.
@@ -94,6 +97,18 @@ enum Command {
         /// Print one JSON object instead, also when the proof fails.
         #[arg(long)]
         json: bool,
+        /// Require that the owner of this key has signed the FMU: a public key file of minisign.
+        #[arg(long, value_name = "PUB")]
+        key: Option<PathBuf>,
+        /// Do not run the binary: no code of the FMU is executed.
+        #[arg(long)]
+        no_run: bool,
+    },
+    /// Runs the binary of a controller FMU beside this program's controller; prints what came of it.
+    #[command(hide = true)]
+    RunBinary {
+        /// FMU that ftc-fmu export wrote.
+        fmu: PathBuf,
     },
     /// Write NAME_controller.fmu and NAME_plant.fmu (FMI 2.0, co-simulation).
     ///
@@ -113,6 +128,10 @@ enum Command {
         /// Also write NAME.ssp: both FMUs and their connections in one file (SSP 1.0).
         #[arg(long)]
         ssp: bool,
+        /// Sign the FMUs with a secret key of minisign (minisign -G); its password is asked for on the
+        /// terminal, or taken from the environment variable FTC_FMU_KEY_PASSWORD.
+        #[arg(long, value_name = "KEY")]
+        sign: Option<PathBuf>,
     },
     /// Run the design's scenario without any FMU: trajectories.csv, metrics.json, report.html and figures.
     ///
@@ -183,6 +202,9 @@ impl From<SolverChoice> for Solver {
         }
     }
 }
+
+/// Seconds from which a design is said to take long before it begins.
+const LONG: f64 = 30.0;
 
 /// Exit code: done.
 const DONE: u8 = 0;
@@ -256,16 +278,26 @@ fn run(arguments: &Arguments, binaries: Option<PathBuf>) -> Result<String, Failu
             (Err(failure), false) => Err(failure),
             (Err(failure), true) => Err(failure.explained_in_json()),
         },
-        Command::Verify { fmu, json } => verify(fmu, *json),
+        Command::Verify {
+            fmu,
+            json,
+            key,
+            no_run,
+        } => verify(fmu, *json, key.as_deref(), *no_run),
+        Command::RunBinary { fmu } => {
+            let ran = package::binary::compare(fmu)?;
+            Ok(serde_json::to_string(&ran).unwrap_or_default() + "\n")
+        }
         Command::Export {
             design,
             out,
             ssp,
             solved,
+            sign,
         } => {
             check_output(out)?;
             let made = solve(design, &asked(solved.as_deref(), None), &progress)?;
-            export(&made, out, *ssp, binaries)
+            export(&made, out, *ssp, binaries, sign.as_deref())
         }
         Command::Simulate {
             design,
@@ -300,8 +332,16 @@ fn run(arguments: &Arguments, binaries: Option<PathBuf>) -> Result<String, Failu
 }
 
 /// Proves again what an FMU promises.
-fn verify(fmu: &Path, as_json: bool) -> Result<String, Failure> {
-    match package::verify(fmu) {
+fn verify(fmu: &Path, as_json: bool, key: Option<&Path>, no_run: bool) -> Result<String, Failure> {
+    let this = std::env::current_exe().ok().filter(|_| !no_run);
+    let checks = package::Checks {
+        key: key
+            .map(package::signature::VerifyingKey::read)
+            .transpose()?,
+        runner: this
+            .map(|program| package::binary::Runner(vec![program.into(), "run-binary".into()])),
+    };
+    match package::verify_with(fmu, &checks) {
         Ok(verification) if as_json => Ok(summary::pretty(&verification.json())),
         Ok(verification) => Ok(verification.to_string()),
         Err(package::Error::Unproved { fmu, what }) => Err(Failure::Refused {
@@ -319,12 +359,14 @@ fn export(
     out: &Path,
     ssp: bool,
     binaries: Option<PathBuf>,
+    sign: Option<&Path>,
 ) -> Result<String, Failure> {
     let options = package::Options {
         out: out.to_path_buf(),
         binaries: binaries.map_or_else(beside_program, Ok)?,
         ssp,
         platforms: None,
+        sign: sign.map(Path::to_path_buf),
     };
     let exported = package::export(&made.design, &options)?;
     let mut text = String::new();
@@ -470,7 +512,20 @@ fn synthesised(
     solver: Solver,
     progress: &Progress,
 ) -> Result<Design, ftc_design::Failure> {
-    progress.tell("solving for gains and certifying them");
+    let work = Work::new(
+        request.plant.dimensions(),
+        request.plant.modes.len(),
+        &request.control,
+    );
+    // Long designs under dwell are made by Riccati equations and are sooner over.
+    let inequalities = request.control.lyapunov != Lyapunov::Dwell;
+    progress.tell(match inequalities && work.seconds > LONG {
+        true => format!(
+            "solving for gains and certifying them, about {}",
+            work.time()
+        ),
+        false => "solving for gains and certifying them".into(),
+    });
     let watch = |step: Step| match step {
         Step::Iteration { number, usual, .. } => progress.iterate(step, number, usual),
         Step::GeneralSolver => progress.tell(step.to_string()),

@@ -313,6 +313,68 @@ fn a_full_standard_output_is_an_error_and_a_closed_one_is_not() {
     assert!(output.stderr.is_empty());
 }
 
+/// Rust opens /dev/null in place of a closed standard output, and what is printed is lost without a word.
+#[cfg(target_os = "linux")]
+#[test]
+fn a_standard_output_that_is_closed_from_the_start_is_an_error() {
+    let bench = Bench::new(SOUND);
+    let shell = |line: &str| {
+        let mut command = std::process::Command::new("sh");
+        command.args(["-c", line, env!("CARGO_BIN_EXE_ftc-fmu"), FILE]);
+        command.current_dir(bench.path(".")).output().unwrap()
+    };
+    let before = bench.files();
+    for line in [
+        "exec \"$0\" design \"$1\" >&-",
+        "exec \"$0\" export \"$1\" --out out >&-",
+    ] {
+        let output = shell(line);
+        assert_eq!(output.status.code(), Some(2));
+        let message = String::from_utf8(output.stderr).unwrap();
+        assert!(message.contains("standard output is closed"), "{message}");
+        assert_eq!(message.trim_end().lines().count(), 1, "{message}");
+        assert_eq!(bench.files(), before);
+    }
+    let unread = shell("exec \"$0\" design \"$1\" > /dev/null <&-");
+    assert_eq!(unread.status.code(), Some(0));
+}
+
+/// 64 states, 32 inputs and outputs, 64 modes under one Lyapunov function: 25 GB, if anybody tried.
+#[test]
+fn what_would_exhaust_memory_is_refused_with_an_estimate() {
+    let (n, half, modes) = (64, 32, 64);
+    let matrix = |rows: usize, columns: usize, value: f64| {
+        let row = |i: usize| {
+            (0..columns)
+                .map(|j| if i == j { value } else { 0.0 })
+                .collect()
+        };
+        let rows: Vec<Vec<f64>> = (0..rows).map(row).collect();
+        format!("{rows:?}")
+    };
+    let mode = format!(
+        "[[mode]]\nA = {}\nB = {}\nC = {}\n",
+        matrix(n, n, 0.5),
+        matrix(n, half, 1.0),
+        matrix(half, n, 1.0)
+    );
+    let text = format!(
+        "name = \"large\"\nsample_time = 1.0\n{}",
+        mode.repeat(modes)
+    );
+    let run = Bench::new(&text).run(&["design", FILE]);
+    assert_eq!(run.code(), 2, "{}", run.stderr());
+    for word in ["GB of memory", "hours", "dwell"] {
+        assert!(run.stderr().contains(word), "{}", run.stderr());
+    }
+    assert_eq!(
+        run.stderr().trim_end().lines().count(),
+        1,
+        "{}",
+        run.stderr()
+    );
+}
+
 #[test]
 fn export_without_binaries_says_what_to_run() {
     let bench = Bench::new(SOUND);
@@ -358,6 +420,7 @@ fn an_fmu_holds_every_platform_that_is_there_and_belongs_to_its_design() {
                 &format!("binaries/win64/sound_{kind}.dll"),
                 "documentation/index.html",
                 "documentation/licenses/license.txt",
+                "documentation/licenses/rust-standard-library.html",
                 "model.png",
                 "modelDescription.xml",
                 "resources/certificate.json",

@@ -1,11 +1,12 @@
 //! `verify` proves what an FMU promises, and notices whatever does not belong to it.
 //!
 //! promise: carried-proof
+//! promise: signed
 #![allow(missing_docs)]
 
 mod common;
 
-use common::{Bench, FILE, Outcome, SOUND, export, installed, unzip};
+use common::{Bench, FILE, Outcome, SOUND, installed, unzip};
 use serde_json::Value;
 use std::collections::BTreeMap;
 use std::fs;
@@ -70,14 +71,23 @@ struct Exported {
 
 impl Exported {
     fn new(design: &str) -> Self {
-        let bench = Bench::new(design);
+        Self::made(Bench::new(design), &[])
+    }
+
+    /// Exported with more arguments.
+    fn made(bench: Bench, arguments: &[&str]) -> Self {
         let program = installed(&bench, &[]);
         let folder = bench.path("bin/fmu-binaries").join(HERE);
         fs::create_dir_all(&folder).unwrap();
         for kind in ["controller", "plant"] {
             fs::write(folder.join(format!("ftc_{kind}.so")), library()).unwrap();
         }
-        let output = export(&bench, &program, "out");
+        let output = std::process::Command::new(&program)
+            .args(["export", FILE, "--out", "out"])
+            .args(arguments)
+            .current_dir(bench.path("."))
+            .output()
+            .unwrap();
         assert!(
             output.status.success(),
             "{}",
@@ -115,6 +125,14 @@ impl Exported {
     }
 
     fn verify(&self) -> Outcome {
+        self.verify_bytes(&self.zipped())
+    }
+
+    fn write(&self, bytes: &[u8]) {
+        fs::write(self.bench.path("x.fmu"), bytes).unwrap();
+    }
+
+    fn zipped(&self) -> Vec<u8> {
         let mut archive = zip::ZipWriter::new(Cursor::new(Vec::new()));
         for (name, bytes) in &self.files {
             archive
@@ -122,12 +140,20 @@ impl Exported {
                 .unwrap();
             archive.write_all(bytes).unwrap();
         }
-        self.verify_bytes(&archive.finish().unwrap().into_inner())
+        archive.finish().unwrap().into_inner()
+    }
+
+    /// What verify says of the files with these arguments: exit code and its one sentence.
+    fn says(&self, arguments: &[&str]) -> (i32, String) {
+        self.write(&self.zipped());
+        let run = self.bench.run(&[&["verify", "x.fmu"], arguments].concat());
+        (run.code(), run.stderr() + &run.stdout())
     }
 
     fn verify_bytes(&self, bytes: &[u8]) -> Outcome {
-        fs::write(self.bench.path("x.fmu"), bytes).unwrap();
-        self.bench.run(&["verify", "x.fmu", "--json"])
+        self.write(bytes);
+        // The libraries of most tests do nothing, so that there is nothing to run.
+        self.bench.run(&["verify", "x.fmu", "--json", "--no-run"])
     }
 
     /// The verdict must be no, in one sentence with these words.
@@ -160,7 +186,7 @@ fn both_fmus_are_proved_and_their_promises_printed() {
     let report = exported.bench.run(&["design", FILE, "--json"]).json();
     for kind in ["controller", "plant"] {
         let path = format!("out/sound_{kind}.fmu");
-        let run = exported.bench.run(&["verify", &path, "--json"]);
+        let run = exported.bench.run(&["verify", &path, "--json", "--no-run"]);
         assert_eq!(run.code(), 0, "{}", run.stderr());
         let found = run.json();
         assert_eq!(found["verified"], true);
@@ -168,13 +194,15 @@ fn both_fmus_are_proved_and_their_promises_printed() {
         assert_eq!(found["state_feedback"]["decay"], 0.7);
         assert_eq!(found["state_feedback"]["arbitrary_switching"], true);
         assert_eq!(found["observer"]["arbitrary_switching"], true);
-        let run = exported.bench.run(&["verify", &path]);
+        let run = exported.bench.run(&["verify", &path, "--no-run"]);
         for word in [
             "proved",
             "arbitrary switching",
             "decay",
             "l2 gain",
             "nothing was solved",
+            "not run",
+            "anybody may have made this FMU",
         ] {
             assert!(run.stdout().contains(word), "{word}: {}", run.stdout());
         }
@@ -433,4 +461,141 @@ fn a_damaged_archive_is_never_taken_for_another_design() {
         }
     }
     assert!(10 * noticed > 8 * places.len(), "{noticed}");
+}
+
+/// Archives that nobody should have to unpack, and descriptions that took minutes to read.
+///
+/// promise: bounded-reading
+#[test]
+fn archives_that_are_none_of_ours() {
+    let exported = Exported::new(SOUND);
+    let bytes = fs::read(exported.bench.path("out/sound_controller.fmu")).unwrap();
+    let refused = |case: &str, bytes: &[u8], word: &str| {
+        let run = exported.verify_bytes(bytes);
+        assert_eq!(run.code(), 2, "{case}: {}", run.stderr());
+        assert!(run.stderr().contains(word), "{case}: {}", run.stderr());
+        assert_eq!(run.stderr().trim_end().lines().count(), 1, "{case}");
+    };
+    refused(
+        "junk after the end",
+        &[&bytes[..], b"junk"].concat(),
+        "damaged",
+    );
+    let mut two_names = bytes.clone();
+    two_names[30] ^= 1;
+    refused("two names", &two_names, "another name");
+    let mut fewer = bytes.clone();
+    let count = fewer.len() - 22 + 10;
+    fewer[count] -= 1;
+    refused("a count that is wrong", &fewer, "damaged");
+
+    for (name, word) in [
+        ("notes.txt", "no part"),
+        ("documentation/../../escaped", "no path inside"),
+        ("/etc/passwd", "no path inside"),
+        ("documentation\\windows", "no path inside"),
+        ("binaries/a\0b", "no path inside"),
+    ] {
+        let mut other = Exported::new(SOUND);
+        other.files.insert(name.into(), b"x".to_vec());
+        other.refused(name, 2, &[word]);
+    }
+    let mut many = Exported::new(SOUND);
+    for number in 0..70 {
+        let name = format!("documentation/{number}");
+        many.files.insert(name, Vec::new());
+    }
+    many.refused("many entries", 2, &["more than 64 entries"]);
+
+    let mut wide = Exported::new(SOUND);
+    let attributes: String = (0..60_000).map(|at| format!(" a{at}=\"\"")).collect();
+    let xml = format!("<fmiModelDescription{attributes} guid=\"none\"/>");
+    wide.files.insert(DESCRIPTION.into(), xml.into_bytes());
+    let begun = std::time::Instant::now();
+    wide.refused("many attributes", 1, &["guid"]);
+    assert!(begun.elapsed().as_secs() < 20, "{:?}", begun.elapsed());
+}
+
+/// Writes a key pair of minisign as `NAME.key` and `NAME.pub`.
+fn key_pair(bench: &Bench, name: &str) {
+    let pair = minisign::KeyPair::generate_unencrypted_keypair().unwrap();
+    let secret = pair.sk.to_box(None).unwrap().into_string();
+    fs::write(bench.path(&format!("{name}.key")), secret).unwrap();
+    let public = pair.pk.to_box().unwrap().into_string();
+    fs::write(bench.path(&format!("{name}.pub")), public).unwrap();
+}
+
+/// A signed FMU is accepted by its key alone; what nothing else looks at cannot be changed either; every
+/// refusal says what is wrong.
+#[test]
+fn a_signature_tells_whose_fmu_it_is() {
+    let bench = Bench::new(SOUND);
+    key_pair(&bench, "own");
+    key_pair(&bench, "other");
+    let mut signed = Exported::made(bench, &["--sign", "own.key"]);
+    let own = ["--no-run", "--key", "own.pub"];
+    let (code, said) = signed.says(&own);
+    assert_eq!(code, 0, "{said}");
+    assert!(said.contains("over every file of the FMU"), "{said}");
+    let (code, said) = signed.says(&["--no-run"]);
+    assert_eq!(code, 0, "{said}");
+    assert!(said.contains("not checked"), "{said}");
+    let (code, said) = signed.says(&["--no-run", "--key", "other.pub"]);
+    assert!(code == 1 && said.contains("not by key"), "{said}");
+    for absent in ["none.pub", "own.key"] {
+        let (code, said) = signed.says(&["--no-run", "--key", absent]);
+        assert!(code == 2 && said.contains(absent), "{said}");
+    }
+    let page = "documentation/index.html";
+    signed.files.insert(page.into(), b"another page".to_vec());
+    for arguments in [&own[..], &["--no-run"]] {
+        let (code, said) = signed.says(arguments);
+        assert!(code == 1 && said.contains(page), "{said}");
+    }
+    let bench = Bench::new(SOUND);
+    key_pair(&bench, "own");
+    let (code, said) = Exported::made(bench, &[]).says(&own);
+    assert!(code == 1 && said.contains("not signed"), "{said}");
+}
+
+/// A key that cannot be used is refused before anything is written.
+#[test]
+fn a_key_that_cannot_sign_is_refused() {
+    let bench = Bench::new(SOUND);
+    fs::write(bench.path("no.key"), "no key\n").unwrap();
+    for key in ["no.key", "none.key"] {
+        let run = bench.run(&["export", FILE, "--out", "out", "--sign", key]);
+        assert_eq!(run.code(), 2, "{}", run.stderr());
+        assert!(run.stderr().contains(key), "{}", run.stderr());
+        assert!(!bench.path("out/sound_controller.fmu").exists());
+    }
+}
+
+/// A library that offers the functions of an FMU and does nothing is found out by running it, and so
+/// is one that crashes or hangs; the program lives on.
+#[test]
+fn a_binary_that_does_something_else_is_found_out() {
+    let exported = Exported::new(SOUND);
+    let (code, said) = exported.says(&["--no-run"]);
+    assert!(code == 0 && said.contains("not run"), "{said}");
+    let (code, said) = exported.says(&[]);
+    assert_eq!(code, 1, "{said}");
+    assert!(said.contains(&format!("the binary for {HERE}")), "{said}");
+    let mut elsewhere = exported;
+    let own = format!("binaries/{HERE}/sound_controller.so");
+    let other = format!("binaries/{ELSEWHERE}/sound_controller.so");
+    let mut bytes = elsewhere.files.remove(&own).unwrap();
+    // The machine an ELF file is for: x86-64 or aarch64.
+    bytes[18..20].copy_from_slice(if HERE == "linux64" {
+        &[0xB7, 0]
+    } else {
+        &[0x3E, 0]
+    });
+    elsewhere.files.insert(other, bytes);
+    let (code, said) = elsewhere.says(&[]);
+    assert_eq!(code, 0, "{said}");
+    assert!(
+        said.contains(&format!("not run: there is none for {HERE}")),
+        "{said}"
+    );
 }

@@ -112,13 +112,28 @@ fn signals(given: &schema::Signals, found: &plant::Found) -> Result<Signals, Str
     let own = dims.states - found.held_inputs;
     let mut states = channels("states", "x", &given.states, own, &points(|p| &p.x))?;
     states.extend(inputs.iter().take(found.held_inputs).map(held));
+    let disturbances = match given.disturbances {
+        Some(_) => channels(
+            "disturbances",
+            "w",
+            &given.disturbances,
+            dims.disturbances,
+            &[],
+        )?,
+        None => Vec::new(),
+    };
     let mut signals = Signals {
         inputs,
         outputs,
         states,
-        disturbances: Vec::new(),
+        disturbances,
     };
     complete_nominal_values(&mut signals, plant);
+    for signal in &mut signals.disturbances {
+        signal.nominal = Some(signal.nominal)
+            .filter(|n| n.is_finite())
+            .unwrap_or(1.0);
+    }
     Ok(signals)
 }
 

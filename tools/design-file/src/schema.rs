@@ -109,6 +109,8 @@ pub struct Signals {
     pub outputs: Option<Vec<SignalInfo>>,
     /// States (n).
     pub states: Option<Vec<SignalInfo>>,
+    /// Disturbances (s).
+    pub disturbances: Option<Vec<SignalInfo>>,
 }
 
 /// What is known of one signal.

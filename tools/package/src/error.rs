@@ -32,6 +32,14 @@ pub enum Error {
         /// Why not.
         source: std::io::Error,
     },
+    /// A key that signs or verifies.
+    #[error("{} {what}", file.display())]
+    Key {
+        /// The key file.
+        file: PathBuf,
+        /// Why not.
+        what: String,
+    },
     /// The output directory.
     #[error(transparent)]
     Output(#[from] output::Error),

@@ -5,6 +5,7 @@ use crate::archive::{self, Contents};
 use crate::certificate::{self, Certificate};
 use crate::output::Staging;
 use crate::platform::{PLATFORMS, Platform};
+use crate::signature::SigningKey;
 use crate::ssp::{self, Component, System};
 use ftc_design::Design;
 use ftc_simulate::Trajectory;
@@ -47,7 +48,7 @@ pub(crate) const KINDS: [Kind; 2] = [
 ];
 
 /// The platform of this machine.
-const HOST: &str = if cfg!(target_os = "windows") {
+pub(crate) const HOST: &str = if cfg!(target_os = "windows") {
     "win64"
 } else if cfg!(target_arch = "aarch64") {
     "aarch64-linux"
@@ -55,7 +56,12 @@ const HOST: &str = if cfg!(target_os = "windows") {
     "linux64"
 };
 
-const LICENSES: &str = include_str!("../assets/licenses.txt");
+/// Licence texts and notices of all that the binaries link, gathered when this program is built.
+const LICENSES: &str = include_str!(concat!(env!("OUT_DIR"), "/licenses.txt"));
+
+/// The same for the standard library, as the toolchain has them.
+const STANDARD_LIBRARY: &str =
+    include_str!(concat!(env!("OUT_DIR"), "/rust-standard-library.html"));
 
 /// What every FMU shows in a browser of models.
 const ICON: &[u8] = include_bytes!("../assets/model.png");
@@ -71,6 +77,7 @@ struct Exporter<'a> {
     /// The experiment, for the documentation's figures.
     runs: Vec<Trajectory>,
     binaries: Vec<Binaries>,
+    key: Option<SigningKey>,
 }
 
 /// What to write, and from what.
@@ -85,6 +92,9 @@ pub struct Options {
     pub ssp: bool,
     /// Which platforms to pack; all that are built when absent.
     pub platforms: Option<Vec<String>>,
+    /// Secret key (a file of `minisign -G`) that signs the FMUs. Signatures are drawn at random: signed
+    /// twice, an FMU differs in that one file.
+    pub sign: Option<PathBuf>,
 }
 
 /// What an export wrote.
@@ -117,9 +127,10 @@ pub struct Packed {
 /// certificate does not check. Every file is written, or none.
 ///
 /// # Errors
-/// [`Error::Uncertified`], [`Error::NoBinaries`], [`Error::Binary`] or [`Error::Output`];
+/// [`Error::Uncertified`], [`Error::NoBinaries`], [`Error::Binary`], [`Error::Key`] or [`Error::Output`];
 /// [`Error::Contents`] where a file cannot be made from this design.
 pub fn export(design: &Design, options: &Options) -> Result<Exported, Error> {
+    let key = options.sign.as_deref().map(SigningKey::read).transpose()?;
     prove(design)?;
     let staging = Staging::new(&options.out)?;
     let json = |error: serde_json::Error| Error::Contents {
@@ -135,6 +146,7 @@ pub fn export(design: &Design, options: &Options) -> Result<Exported, Error> {
         interface: Interface::from(design),
         runs: documentation::runs(design),
         binaries: Binaries::find(options)?,
+        key,
     };
     let mut fmus = Contents::new();
     for kind in &KINDS {
@@ -219,9 +231,16 @@ impl Exporter<'_> {
                 self.document(kind).into_bytes(),
             ),
             ("documentation/licenses/license.txt".into(), LICENSES.into()),
+            (
+                "documentation/licenses/rust-standard-library.html".into(),
+                STANDARD_LIBRARY.into(),
+            ),
         ]);
         for binaries in self.binaries.iter().filter(|binaries| !binaries.outdated) {
             contents.insert(binaries.platform.path(&identifier), binaries.read(kind)?);
+        }
+        if let Some(key) = &self.key {
+            key.sign(&self.file(kind), &mut contents)?;
         }
         archive::zip(&identifier, &contents)
     }

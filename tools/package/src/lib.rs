@@ -13,6 +13,7 @@
 //!     binaries: "target/release".into(),
 //!     ssp: false,
 //!     platforms: None,
+//!     sign: None,
 //! };
 //! for path in package::export(&design, &options)?.paths {
 //!     println!("{}", path.display());
@@ -23,14 +24,17 @@
 //! ```
 
 mod archive;
+pub mod binary;
 pub mod certificate;
 mod error;
 mod export;
 pub mod output;
 pub mod platform;
+mod reading;
+pub mod signature;
 mod ssp;
 mod verify;
 
 pub use error::Error;
 pub use export::{Exported, Options, Packed, export};
-pub use verify::{Verification, verify};
+pub use verify::{Checks, Verification, verify, verify_with};

@@ -1,10 +1,26 @@
-//! An output directory that gets all of its files or none.
+//! An output directory that gets all of its files or none, also when the program is killed.
+//!
+//! Files are collected in a hidden directory of the output directory and flushed to the disk. It
+//! is renamed to [`READY`] once it is complete: from then on the new files count, and are moved into
+//! place one by one. Who is killed before that has changed nothing; who is killed after it leaves
+//! whole files, old ones and new ones, and the next run into that directory moves the rest before
+//! it does anything else. A hidden directory is locked by the run that writes it, so that runs that
+//! ended are told from those that go on, and swept.
 
 use std::ffi::{OsStr, OsString};
-use std::fs;
-use std::io;
+use std::fs::{self, File};
+use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 use tempfile::TempDir;
+
+/// How hidden directories begin.
+const HIDDEN: &str = ".ftc-fmu-";
+
+/// The hidden directory whose files are complete.
+const READY: &str = ".ftc-fmu-ready";
+
+/// The file in a hidden directory that its run has locked.
+const LOCK: &str = ".lock";
 
 /// Where replaced files are kept until all new ones are in place.
 const ASIDE: &str = ".replaced";
@@ -24,6 +40,8 @@ pub struct Error {
 pub struct Staging {
     out: PathBuf,
     temporary: TempDir,
+    /// Locked as long as this run goes on.
+    _lock: File,
     /// Directories that were made for the output, innermost first.
     made: Vec<PathBuf>,
 }
@@ -42,15 +60,22 @@ impl Staging {
             .take_while(|path| !path.exists())
             .map(Path::to_path_buf)
             .collect();
-        let temporary = fs::create_dir_all(out)
-            .and_then(|()| tempfile::Builder::new().prefix(".ftc-fmu-").tempdir_in(out))
-            .map_err(|error| {
-                remove(&made);
-                blame(out, &error)
-            })?;
+        let prepare = || {
+            fs::create_dir_all(out)?;
+            recover(out)?;
+            let temporary = tempfile::Builder::new().prefix(HIDDEN).tempdir_in(out)?;
+            let lock = File::create(temporary.path().join(LOCK))?;
+            lock.lock()?;
+            Ok((temporary, lock))
+        };
+        let (temporary, lock) = prepare().map_err(|error| {
+            remove(&made);
+            blame(out, &error)
+        })?;
         Ok(Self {
             out: out.to_path_buf(),
             temporary,
+            _lock: lock,
             made,
         })
     }
@@ -65,7 +90,12 @@ impl Staging {
     /// # Errors
     /// One sentence that names the directory.
     pub fn add(&self, name: &str, bytes: &[u8]) -> Result<(), Error> {
-        fs::write(self.folder().join(name), bytes).map_err(|error| blame(&self.out, &error))
+        let write = || {
+            let mut file = File::create(self.folder().join(name))?;
+            file.write_all(bytes)?;
+            file.sync_all()
+        };
+        write().map_err(|error| blame(&self.out, &error))
     }
 
     /// Moves every file into place and returns their paths in alphabetical order. Where one cannot
@@ -78,38 +108,25 @@ impl Staging {
         for name in &names {
             self.check_way(name)?;
         }
-        let aside = self.folder().join(ASIDE);
-        fs::create_dir(&aside).map_err(|error| blame(&self.out, &error))?;
-        self.exchange(&names, &aside)?;
+        let ready = self.out.join(READY);
+        let prepare = || {
+            fs::create_dir(self.folder().join(ASIDE))?;
+            flush(self.folder())?;
+            fs::rename(self.folder(), &ready)?;
+            flush(&self.out)
+        };
+        prepare().map_err(|error| blame(&self.out, &error))?;
+        let moved = exchange(&self.out, &ready, &names);
+        // What is left of it is gone either way.
+        fs::remove_dir_all(&ready).ok();
+        moved.map_err(|what| fault(&self.out, what))?;
         self.made.clear();
         Ok(names.iter().map(|name| self.out.join(name)).collect())
     }
 
-    /// Puts all files into place, or none.
-    fn exchange(&self, names: &[OsString], aside: &Path) -> Result<(), Error> {
-        for (done, name) in names.iter().enumerate() {
-            if let Err(error) = self.swap(name, aside) {
-                for name in names[..=done].iter().rev() {
-                    self.swap_back(name, aside);
-                }
-                let what = format!(
-                    "{} cannot be written ({error}): name another directory",
-                    name.to_string_lossy()
-                );
-                return Err(fault(&self.out, what));
-            }
-        }
-        Ok(())
-    }
-
     /// The files collected, in alphabetical order.
     fn names(&self) -> io::Result<Vec<OsString>> {
-        let entries = fs::read_dir(self.folder())?;
-        let mut names: Vec<OsString> = entries
-            .map(|entry| entry.map(|entry| entry.file_name()))
-            .collect::<io::Result<_>>()?;
-        names.sort();
-        Ok(names)
+        collected(self.folder())
     }
 
     /// A file may be replaced, a directory may not.
@@ -126,30 +143,92 @@ impl Staging {
             _ => Ok(()),
         }
     }
+}
 
-    /// Puts a file into place, and what stood there `aside`.
-    fn swap(&self, name: &OsStr, aside: &Path) -> io::Result<()> {
-        let target = self.out.join(name);
-        if fs::symlink_metadata(&target).is_ok() {
-            fs::rename(&target, aside.join(name))?;
-        }
-        fs::rename(self.folder().join(name), target)
-    }
+/// The files of a hidden directory, in alphabetical order.
+fn collected(folder: &Path) -> io::Result<Vec<OsString>> {
+    let names = fs::read_dir(folder)?.map(|entry| entry.map(|entry| entry.file_name()));
+    let mut names: Vec<OsString> = names.collect::<io::Result<_>>()?;
+    names.retain(|name| name != LOCK && name != ASIDE);
+    names.sort();
+    Ok(names)
+}
 
-    /// The reverse, as far as it had come.
-    fn swap_back(&self, name: &OsStr, aside: &Path) {
-        let (target, fresh, old) = (
-            self.out.join(name),
-            self.folder().join(name),
-            aside.join(name),
-        );
-        if !fresh.exists() {
-            fs::rename(&target, fresh).ok();
+/// Finishes what runs that were killed had completed, and sweeps what they had not.
+fn recover(out: &Path) -> io::Result<()> {
+    for entry in fs::read_dir(out)? {
+        let folder = entry?.path();
+        let name = folder.file_name().unwrap_or_default();
+        if !name.to_string_lossy().starts_with(HIDDEN) || !folder.is_dir() {
+            continue;
         }
-        if fs::symlink_metadata(&old).is_ok() {
-            fs::rename(old, target).ok();
+        let lock = File::options().write(true).open(folder.join(LOCK));
+        if lock.as_ref().is_ok_and(|lock| lock.try_lock().is_err()) {
+            // Its run goes on.
+            continue;
+        }
+        if name == READY {
+            for name in collected(&folder)? {
+                fs::rename(folder.join(&name), out.join(&name))?;
+            }
+            flush(out)?;
+        }
+        fs::remove_dir_all(&folder)?;
+    }
+    Ok(())
+}
+
+/// Puts all files of `ready` into place in `out`, or none.
+fn exchange(out: &Path, ready: &Path, names: &[OsString]) -> Result<(), String> {
+    for (done, name) in names.iter().enumerate() {
+        if let Err(error) = swap(out, ready, name) {
+            for name in names[..=done].iter().rev() {
+                swap_back(out, ready, name);
+            }
+            return Err(format!(
+                "{} cannot be written ({error}): name another directory",
+                name.to_string_lossy()
+            ));
         }
     }
+    flush(out).map_err(|error| format!("cannot be flushed to the disk ({error})"))
+}
+
+/// Puts a file into place; what stood there remains under its name until then, and aside.
+fn swap(out: &Path, ready: &Path, name: &OsStr) -> io::Result<()> {
+    let (target, old) = (out.join(name), ready.join(ASIDE).join(name));
+    if fs::symlink_metadata(&target).is_ok() {
+        // Not every file system has hard links.
+        match fs::hard_link(&target, &old) {
+            Err(error) if error.kind() == io::ErrorKind::AlreadyExists => return Err(error),
+            Err(_) => fs::rename(&target, &old)?,
+            Ok(()) => {}
+        }
+    }
+    fs::rename(ready.join(name), target)
+}
+
+/// The reverse, as far as it had come.
+fn swap_back(out: &Path, ready: &Path, name: &OsStr) {
+    let (target, fresh, old) = (
+        out.join(name),
+        ready.join(name),
+        ready.join(ASIDE).join(name),
+    );
+    if !fresh.exists() {
+        fs::rename(&target, fresh).ok();
+    }
+    if fs::symlink_metadata(&old).is_ok() {
+        fs::rename(old, target).ok();
+    }
+}
+
+/// Flushes a directory's names to the disk, where the system can.
+fn flush(folder: &Path) -> io::Result<()> {
+    if cfg!(unix) {
+        File::open(folder)?.sync_all()?;
+    }
+    Ok(())
 }
 
 fn blame(out: &Path, error: &io::Error) -> Error {
@@ -196,19 +275,96 @@ mod tests {
             staging.add(name, b"new").unwrap();
         }
         let names = staging.names().unwrap();
-        // The old c cannot be put aside: a directory has its name there.
-        let aside = TempDir::new_in(out).unwrap();
-        fs::create_dir(aside.path().join("c")).unwrap();
-        let message = staging
-            .exchange(&names, aside.path())
-            .unwrap_err()
-            .to_string();
-        assert!(message.contains(": c cannot be written"), "{message}");
+        // The old c cannot be put aside: a directory bears its name there.
+        fs::create_dir_all(staging.folder().join(ASIDE).join("c")).unwrap();
+        let message = exchange(out, staging.folder(), &names).unwrap_err();
+        assert!(message.starts_with("c cannot be written"), "{message}");
         assert_eq!(fs::read_to_string(out.join("a")).unwrap(), "old a");
         assert!(!out.join("b").exists());
         assert_eq!(fs::read_to_string(out.join("c")).unwrap(), "old c");
+        fs::remove_dir_all(staging.folder().join(ASIDE)).unwrap();
         let paths = staging.commit().unwrap();
         assert_eq!(paths.len(), 3);
         assert_eq!(fs::read_to_string(out.join("c")).unwrap(), "new");
+    }
+
+    /// Which generation each file is of.
+    fn generations(out: &Path) -> Vec<String> {
+        let read = |name: &str| fs::read_to_string(out.join(name)).unwrap_or_default();
+        NAMES.iter().map(|name| read(name)).collect()
+    }
+
+    const NAMES: [&str; 4] = ["a.fmu", "b.fmu", "c.ssp", "d.csv"];
+
+    /// Not a test of its own: writes set after set, until it is killed by the test below.
+    #[test]
+    fn writes_until_it_is_killed() {
+        let Some(out) = std::env::var_os("FTC_OUTPUT_TO_BE_KILLED") else {
+            return;
+        };
+        for generation in 0..1_000_000 {
+            let staging = Staging::new(Path::new(&out)).unwrap();
+            for name in NAMES {
+                staging
+                    .add(name, generation.to_string().as_bytes())
+                    .unwrap();
+            }
+            staging.commit().unwrap();
+        }
+    }
+
+    // promise: all-or-none
+    #[test]
+    #[cfg(unix)]
+    fn a_run_that_is_killed_leaves_one_set_once_the_next_has_begun() {
+        let root = TempDir::new().unwrap();
+        let mut last = -1;
+        for round in 0..40_u64 {
+            let before = generations(root.path());
+            let mut run = std::process::Command::new(std::env::current_exe().unwrap())
+                .args(["--exact", "output::tests::writes_until_it_is_killed"])
+                .env("FTC_OUTPUT_TO_BE_KILLED", root.path())
+                .stdout(std::process::Stdio::null())
+                .spawn()
+                .unwrap();
+            // Another moment in every round: early ones, and those after a set was written.
+            let begun = std::time::Instant::now();
+            while round % 2 == 1
+                && generations(root.path()) == before
+                && begun.elapsed().as_secs() < 60
+            {
+                std::thread::yield_now();
+            }
+            let micros = 2_000 + round * 7_919 % 40_000;
+            std::thread::sleep(std::time::Duration::from_micros(micros));
+            run.kill().unwrap();
+            run.wait().unwrap();
+            drop(Staging::new(root.path()).unwrap());
+            let found = generations(root.path());
+            assert!(
+                found.iter().all(|of| *of == found[0]),
+                "round {round}: {found:?}"
+            );
+            last = last.max(found[0].parse().unwrap_or(-1));
+            let hidden = fs::read_dir(root.path()).unwrap().filter(|entry| {
+                let name = entry.as_ref().unwrap().file_name();
+                name.to_string_lossy().starts_with('.')
+            });
+            assert_eq!(hidden.count(), 0, "round {round}");
+        }
+        assert!(last >= 0, "some sets were completed");
+    }
+
+    #[test]
+    fn a_directory_that_a_run_works_in_is_left_alone() {
+        let root = TempDir::new().unwrap();
+        let first = Staging::new(root.path()).unwrap();
+        first.add("a", b"first").unwrap();
+        let second = Staging::new(root.path()).unwrap();
+        second.add("a", b"second").unwrap();
+        first.commit().unwrap();
+        assert_eq!(fs::read_to_string(root.path().join("a")).unwrap(), "first");
+        second.commit().unwrap();
+        assert_eq!(fs::read_to_string(root.path().join("a")).unwrap(), "second");
     }
 }

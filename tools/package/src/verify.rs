@@ -1,27 +1,25 @@
 //! Proves again, from the doubles an FMU ships, what it promises. Nothing is solved.
 
 use crate::Error;
+use crate::binary::{Ran, Runner};
 use crate::certificate::{self, Certificate, Promise};
-use crate::export::{KINDS, Kind};
+use crate::export::{HOST, KINDS, Kind};
 use crate::platform::PLATFORMS;
+use crate::reading;
+use crate::signature::{self, Origin, VerifyingKey};
 use ftc_design::{Design, LostSensors};
-use roxmltree::Document;
+use quick_xml::escape::unescape;
+use quick_xml::events::Event;
 use serde_json::{Value, json};
 use std::collections::BTreeMap;
 use std::fmt;
-use std::fs::{self, File};
-use std::io::Read;
 use std::path::Path;
-use zip::ZipArchive;
 
 const DESIGN: &str = "resources/design.json";
 const DESCRIPTION: &str = "modelDescription.xml";
 
-/// No entry of an FMU of ours is larger.
-const LARGEST_ENTRY: u64 = 256 << 20;
-
 /// Why an FMU is not verified.
-enum Refusal {
+pub(crate) enum Refusal {
     /// It cannot be read, or is none of ours.
     Unreadable(String),
     /// It does not hold what it promises.
@@ -30,73 +28,123 @@ enum Refusal {
 
 use Refusal::{Unproved, Unreadable};
 
-/// Reads an FMU and proves its certificate again.
+impl Refusal {
+    /// The same, of this file.
+    pub(crate) fn of(self, fmu: &Path) -> Error {
+        let fmu = fmu.to_path_buf();
+        match self {
+            Unreadable(what) => Error::Unreadable { fmu, what },
+            Unproved(what) => Error::Unproved { fmu, what },
+        }
+    }
+}
+
+/// What is looked at beyond the proof.
+#[derive(Default)]
+pub struct Checks {
+    /// The key that must have signed the FMU.
+    pub key: Option<VerifyingKey>,
+    /// How to run the binary for this machine; without it no code of the FMU is run.
+    pub runner: Option<Runner>,
+}
+
+/// Reads an FMU and proves its certificate again; no code of the FMU is run.
 ///
 /// # Errors
 /// [`Error::Unreadable`] for a file that is not an FMU of this program or is damaged,
 /// [`Error::Unproved`] where its parts do not agree or a promise cannot be proved.
 pub fn verify(path: &Path) -> Result<Verification, Error> {
-    let fmu = path.to_path_buf();
-    let result = contents(path).and_then(|files| Fmu { files }.verify());
-    result.map_err(|refusal| match refusal {
-        Unreadable(what) => Error::Unreadable { fmu, what },
-        Unproved(what) => Error::Unproved { fmu, what },
-    })
+    verify_with(path, &Checks::default())
 }
 
-/// Every file of the archive; reading one checks its checksum.
-fn contents(path: &Path) -> Result<BTreeMap<String, Vec<u8>>, Refusal> {
-    let file = File::open(path)
-        .map_err(|error| Unreadable(format!("cannot be opened ({error}): name an FMU")))?;
-    if fs::metadata(path).is_ok_and(|about| about.is_dir()) {
-        return Err(Unreadable("this is a directory: name an FMU in it".into()));
-    }
-    let damaged =
-        |what: String| Unreadable(format!("the archive is damaged ({what}): export it again"));
-    let mut archive = ZipArchive::new(file).map_err(|error| match is_zip(path) {
-        true => damaged(error.to_string()),
-        false => Unreadable("this is no FMU: name one that ftc-fmu export wrote".into()),
-    })?;
-    let mut files = BTreeMap::new();
-    for index in 0..archive.len() {
-        let mut entry = archive
-            .by_index(index)
-            .map_err(|error| damaged(error.to_string()))?;
-        let name = entry
-            .name()
-            .map_err(|error| damaged(error.to_string()))?
-            .into_owned();
-        let mut bytes = Vec::new();
-        (&mut entry)
-            .take(LARGEST_ENTRY)
-            .read_to_end(&mut bytes)
-            .map_err(|error| damaged(format!("{name}: {error}")))?;
-        if bytes.len() as u64 == LARGEST_ENTRY || files.insert(name.clone(), bytes).is_some() {
-            return Err(damaged(format!("{name} is too large or stands twice")));
+/// [`verify`], and whatever else is asked for.
+///
+/// # Errors
+/// As [`verify`]; [`Error::Unproved`] also where the key that is given has not signed the FMU as it is,
+/// and where its binary does something else than the controller of its design.
+pub fn verify_with(path: &Path, checks: &Checks) -> Result<Verification, Error> {
+    let verified = Fmu::open(path).and_then(|fmu| {
+        let origin = signature::check(&fmu.files, checks.key.as_ref()).map_err(Unproved)?;
+        let mut found = fmu.verify(origin)?;
+        if let Some(runner) = &checks.runner {
+            found.ran = match runner.run(path)? {
+                Ran::Differs(what) => {
+                    return Err(Unproved(format!(
+                        "the binary for {HOST} {what}: it is not this design's, export it again"
+                    )));
+                }
+                ran => ran,
+            };
+        }
+        Ok(found)
+    });
+    verified.map_err(|refusal| refusal.of(path))
+}
+
+/// Whether an FMU of ours may have a file of this path; which binaries it has is looked at later.
+fn is_known(path: &str) -> bool {
+    let folders = ["documentation/", "binaries/"];
+    let files = [
+        DESIGN,
+        DESCRIPTION,
+        certificate::PATH,
+        signature::MANIFEST,
+        signature::SIGNATURE,
+        "model.png",
+    ];
+    files.contains(&path) || folders.iter().any(|folder| path.starts_with(folder))
+}
+
+/// The guid at the root of a description: the first element's, whatever follows it.
+fn guid(description: &str) -> Result<Option<String>, String> {
+    let mut reader = quick_xml::Reader::from_str(description);
+    loop {
+        match reader.read_event().map_err(|error| error.to_string())? {
+            Event::Start(root) | Event::Empty(root) => {
+                // Without the check for attributes that stand twice, which takes the square of their number.
+                let mut attributes = root.attributes();
+                let mut attributes = attributes.with_checks(false).flatten();
+                let guid = attributes.find(|attribute| attribute.key.as_ref() == "guid");
+                return Ok(guid
+                    .map(|attribute| unescape(&attribute.value).unwrap_or_default().into_owned()));
+            }
+            Event::Eof => return Err("there is no element in it".into()),
+            _ => {}
         }
     }
-    Ok(files)
-}
-
-/// Whether a file begins as zip archives do.
-fn is_zip(path: &Path) -> bool {
-    let mut magic = [0; 2];
-    File::open(path)
-        .and_then(|mut file| file.read_exact(&mut magic))
-        .is_ok()
-        && &magic == b"PK"
 }
 
 /// An unpacked FMU.
-struct Fmu {
+pub(crate) struct Fmu {
     files: BTreeMap<String, Vec<u8>>,
 }
 
 impl Fmu {
-    fn verify(&self) -> Result<Verification, Refusal> {
-        let bytes = self.file(DESIGN)?;
-        let kind = self.kind(bytes)?;
-        let design: Design = parse(DESIGN, bytes)?;
+    pub(crate) fn open(path: &Path) -> Result<Self, Refusal> {
+        let files = reading::files(path, is_known).map_err(Unreadable)?;
+        Ok(Self { files })
+    }
+
+    /// The bytes of the design.
+    pub(crate) fn resource(&self) -> Result<&Vec<u8>, Refusal> {
+        self.file(DESIGN)
+    }
+
+    /// Which FMU it is, and its design.
+    pub(crate) fn design(&self) -> Result<(&'static Kind, Design), Refusal> {
+        let bytes = self.resource()?;
+        Ok((self.kind(bytes)?, parse(DESIGN, bytes)?))
+    }
+
+    /// The binary for this machine.
+    pub(crate) fn binary(&self, identifier: &str) -> Option<&Vec<u8>> {
+        let platform = PLATFORMS.iter().find(|platform| platform.name == HOST)?;
+        self.files.get(&platform.path(identifier))
+    }
+
+    fn verify(&self, origin: Origin) -> Result<Verification, Refusal> {
+        let bytes = self.resource()?;
+        let (kind, design) = self.design()?;
         design.check().map_err(Unproved)?;
         let shipped: Certificate = parse(certificate::PATH, self.file(certificate::PATH)?)?;
         ftc_design::coverage::check(&design).map_err(Unproved)?;
@@ -114,6 +162,8 @@ impl Fmu {
             design,
             certificate: shipped,
             platforms,
+            origin,
+            ran: Ran::NotRun("nobody asked for it".into()),
         })
     }
 
@@ -129,10 +179,10 @@ impl Fmu {
     fn kind(&self, design: &[u8]) -> Result<&'static Kind, Refusal> {
         let text = std::str::from_utf8(self.file(DESCRIPTION)?)
             .map_err(|_| Unreadable(format!("{DESCRIPTION} is not UTF-8: export it again")))?;
-        let document = Document::parse(text)
+        let guid = guid(text)
             .map_err(|error| Unreadable(format!("{DESCRIPTION}: {error}: export it again")))?;
-        let guid = document.root_element().attribute("guid");
-        let belongs = |kind: &&Kind| guid == Some(&model_description::guid(kind.binary, design));
+        let belongs =
+            |kind: &&Kind| guid.as_ref() == Some(&model_description::guid(kind.binary, design));
         KINDS.iter().find(belongs).ok_or_else(|| {
             Unproved(format!(
                 "the guid in {DESCRIPTION} does not belong to {DESIGN}: one of them was changed, export it again"
@@ -204,6 +254,10 @@ pub struct Verification {
     pub certificate: Certificate,
     /// Platforms for which there is a binary.
     pub platforms: Vec<&'static str>,
+    /// Who has signed it.
+    pub origin: Origin,
+    /// What came of running the binary for this machine.
+    pub ran: Ran,
 }
 
 impl fmt::Display for Verification {
@@ -273,10 +327,21 @@ impl fmt::Display for Verification {
         line(
             "binaries",
             format!(
-                "{}: of the platform, with the functions of an FMU; their machine code is not proved",
+                "{}: of the platform, with the functions of an FMU",
                 self.platforms.join(", ")
             ),
-        )
+        )?;
+        line(
+            "binary, run",
+            match &self.ran {
+                Ran::Agrees(ticks) => format!(
+                    "{HOST}: to the bit what this program's controller gives, over {ticks} ticks of random signals"
+                ),
+                Ran::NotRun(why) => format!("not run: {why}"),
+                Ran::Differs(what) => what.clone(),
+            },
+        )?;
+        line("signed", self.origin.to_string())
     }
 }
 
@@ -306,6 +371,11 @@ impl Verification {
             "observer": of(&claims.observer),
             "not_proved": ftc_design::coverage::UNCOVERED,
             "platforms": self.platforms,
+            "ran": self.ran,
+            "signed_by": match &self.origin {
+                Origin::Signed(id) => Some(id),
+                _ => None,
+            },
         })
     }
 }

@@ -187,6 +187,17 @@ fn of_the_converter() {
     every_leaf_of("converter.toml");
 }
 
+#[test]
+fn of_the_paper_with_an_internal_model() {
+    every_leaf_of("paper_internal_model.toml");
+}
+
+/// Its plants and predictors come from logs.
+#[test]
+fn of_a_plant_from_logs() {
+    every_leaf_of("logged.toml");
+}
+
 /// What made a loop of |y| 0.61 reach 1e5 once: each is refused by name.
 #[test]
 fn what_decides_the_command_is_derived_again() {

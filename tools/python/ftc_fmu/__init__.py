@@ -11,6 +11,7 @@ design.export("out")
 from __future__ import annotations
 
 import json
+import sys
 from typing import TYPE_CHECKING, Any
 
 from ftc_fmu import _core
@@ -30,17 +31,26 @@ if TYPE_CHECKING:
 __version__ = _core.version()
 
 
-def verify(path: str | PathLike[str]) -> dict[str, Any]:
+def verify(path: str | PathLike[str], *, key: str | PathLike[str] | None = None, run: bool = True) -> dict[str, Any]:
     """Proves again, from the numbers in an FMU alone, what it promises; nothing is solved.
+
+    Args:
+        path: The FMU.
+        key: Public key file of minisign; its owner must have signed the FMU.
+        run: Also run a controller's binary for this machine, in a process of its own, and compare
+            it to the bit with this package's controller; `False` executes no code of the FMU.
 
     Returns:
         What is proved: stability under which switching, decay, gamma per mode, platforms.
 
     Raises:
-        Unproved: A promise does not hold, or the FMU's parts do not belong together.
+        Unproved: A promise does not hold, the FMU's parts do not belong together, the binary does
+            something else, or the key's owner has not signed the FMU as it is.
+        DesignFileError: The key cannot be read.
         FtcError: The file is no FMU of this package, or damaged.
     """
-    return json.loads(_core.verify(str(path)))
+    runner = [sys.executable, "-m", "ftc_fmu", "run-binary"] if run else None
+    return json.loads(_core.verify(str(path), None if key is None else str(key), runner))
 
 
 def platforms() -> list[str]:

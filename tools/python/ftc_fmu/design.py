@@ -108,6 +108,7 @@ class Design:
         fmi: str = "2.0",
         platforms: Sequence[str] | None = None,
         ssp: bool = False,
+        sign: str | PathLike[str] | None = None,
     ) -> list[Path]:
         """Writes NAME_controller.fmu and NAME_plant.fmu, and with `ssp` the package of both.
 
@@ -116,6 +117,8 @@ class Design:
             fmi: Version of the interface; only "2.0" is there.
             platforms: Which of `ftc_fmu.platforms()` to pack; all by default.
             ssp: Also write NAME.ssp, both FMUs connected (SSP 1.0).
+            sign: Secret key file of minisign that signs the FMUs; its password, if any, is taken
+                from the environment variable FTC_FMU_KEY_PASSWORD.
 
         Returns:
             The paths that were written.
@@ -126,7 +129,8 @@ class Design:
         if fmi != "2.0":
             raise DesignFileError(f'fmi is "{fmi}": FMUs of version "2.0" are written, no other', "fmi")
         wanted = None if platforms is None else list(platforms)
-        return [Path(path) for path in self.core.export(str(Path(out)), HOME, ssp, wanted)]
+        key = None if sign is None else str(Path(sign))
+        return [Path(path) for path in self.core.export(str(Path(out)), HOME, ssp, wanted, key)]
 
     def controller(self) -> Controller:
         """Returns the controller itself: the code that runs in the FMU, at rest in mode 1."""

@@ -134,6 +134,7 @@ impl Design {
         binaries: PathBuf,
         ssp: bool,
         platforms: Option<Vec<String>>,
+        sign: Option<PathBuf>,
     ) -> PyResult<Vec<PathBuf>> {
         let made = self.0.clone();
         let options = package::Options {
@@ -141,6 +142,7 @@ impl Design {
             binaries,
             ssp,
             platforms,
+            sign,
         };
         let written = wait(py, &|| "exporting".into(), None, move || {
             package::export(&made.design, &options)

@@ -89,6 +89,7 @@ pub fn of_package(py: Python<'_>, error: package::Error) -> PyErr {
     match error {
         package::Error::Unproved { .. } => make(py, "Unproved", (sentence,)),
         package::Error::Output(_) => make(py, "DesignFileError", (sentence, "out")),
+        package::Error::Key { .. } => make(py, "DesignFileError", (sentence, "key")),
         package::Error::NoPlatform { .. } => make(py, "DesignFileError", (sentence, "platforms")),
         _ => make(py, "FtcError", (sentence,)),
     }

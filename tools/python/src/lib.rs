@@ -38,10 +38,22 @@ fn main(py: Python<'_>, arguments: Vec<OsString>, binaries: PathBuf) -> u8 {
     py.detach(|| ftc_fmu::main(arguments, Some(binaries)))
 }
 
-/// Proves an FMU again; returns the proof as JSON.
+/// Proves an FMU again; returns the proof as JSON. `runner` is the command that runs its binary.
 #[pyfunction]
-fn verify(py: Python<'_>, path: PathBuf) -> PyResult<String> {
-    let proved = py.detach(|| package::verify(&path));
+fn verify(
+    py: Python<'_>,
+    path: PathBuf,
+    key: Option<PathBuf>,
+    runner: Option<Vec<OsString>>,
+) -> PyResult<String> {
+    let proved = py.detach(|| {
+        let key = key.as_deref().map(package::signature::VerifyingKey::read);
+        let checks = package::Checks {
+            key: key.transpose()?,
+            runner: runner.map(package::binary::Runner),
+        };
+        package::verify_with(&path, &checks)
+    });
     proved
         .map(|verification| report::summary::pretty(&verification.json()))
         .map_err(|error| errors::of_package(py, error))

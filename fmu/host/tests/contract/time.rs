@@ -118,3 +118,39 @@ fn a_long_step_of_one_instance_is_as_many_short_ones() {
         assert_eq!(long.bits(), short.bits(), "step {k}");
     }
 }
+
+/// A master that steps both in parallel with a design that allows for no delay: one warning, soon.
+///
+/// promise: wrong-delay
+#[test]
+fn a_wrong_coupling_is_told_once() {
+    let pair = Pair::load();
+    for coupling in [GaussSeidel, Jacobi] {
+        let mut closed = pair.close(0.0);
+        let mut first = None;
+        for k in 0..1200_u32 {
+            closed.step_to(f64::from(k + 1), coupling, true);
+            let told = warnings(&closed.controller);
+            if !told.is_empty() && first.is_none() {
+                first = Some(k);
+            }
+        }
+        let told = warnings(&closed.controller);
+        match coupling {
+            GaussSeidel => assert_eq!(told, Vec::<String>::new()),
+            Jacobi => {
+                assert_eq!(told.len(), 1, "{told:?}");
+                assert!(told[0].contains("one sample more of delay"), "{told:?}");
+                assert!(first.unwrap() < 200, "{first:?}");
+            }
+        }
+    }
+}
+
+fn warnings(it: &fmu_host::Instance) -> Vec<String> {
+    let messages = it.messages.lock().unwrap();
+    let warned = messages
+        .iter()
+        .filter(|(status, ..)| *status == Status::Warning);
+    warned.map(|(_, _, text)| text.clone()).collect()
+}

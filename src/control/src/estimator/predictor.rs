@@ -80,7 +80,7 @@ pub fn leverage(factor: &Matrix, regressor: &[f64], whitened: &mut [f64]) -> f64
         let (Some(value), Some(&pivot)) = (rest.first_mut(), diagonal.first()) else {
             break;
         };
-        *value = kernel::bounded((entry - kernel::dot(above, solved)) / pivot);
+        *value = kernel::bounded((entry - kernel::long_dot(above, solved)) / pivot);
         sum += *value * *value;
     }
     kernel::bounded(sum)

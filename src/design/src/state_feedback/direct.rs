@@ -48,8 +48,8 @@ impl Road<'_> {
             self.settled_level(&regulated.with_signals(&self.models, group), group)
         });
         let mut least = least.collect::<Option<Vec<_>>>()?;
-        let (smallest, others) = SACRIFICES.split_first()?;
-        if let Some(design) = self.with_margin(&groups, &least, *smallest) {
+        let [smallest, small, others @ ..] = SACRIFICES;
+        if let Some(design) = self.with_margin(&groups, &least, smallest) {
             return Some(design);
         }
         // Once more, in the coordinates that the first answer suggests.
@@ -59,12 +59,15 @@ impl Road<'_> {
                 *found = again;
             }
         }
-        self.with_margin(&groups, &least, *smallest)
-            .or_else(|| (0..CENTRED).find_map(|back| self.on_path(&groups, &least, back)))
+        let on_path =
+            |most: f64| (0..CENTRED).find_map(|back| self.on_path(&groups, &least, back, most));
+        self.with_margin(&groups, &least, smallest)
+            .or_else(|| on_path(small))
+            .or_else(|| self.with_margin(&groups, &least, small))
+            .or_else(|| on_path(f64::INFINITY))
             .or_else(|| {
-                others
-                    .iter()
-                    .find_map(|more| self.with_margin(&groups, &least, *more))
+                let mut larger = others.iter();
+                larger.find_map(|more| self.with_margin(&groups, &least, *more))
             })
     }
 
@@ -84,12 +87,14 @@ impl Road<'_> {
         self.certified(parts, Some(levels)).ok()
     }
 
-    /// Gains from the central path, `back` points before its end, certified.
+    /// Gains from the central path, `back` points before its end, certified; none where any group would
+    /// give up more than `most` of its level.
     fn on_path(
         &self,
         groups: &[Vec<usize>],
         least: &[Found],
         back: usize,
+        most: f64,
     ) -> Option<StateFeedback> {
         let mut levels = Levels::new(self);
         let mut parts = Vec::new();
@@ -97,6 +102,9 @@ impl Road<'_> {
             let at = found.centred.len().checked_sub(1 + back)?;
             let (level, passed) = &found.centred[at];
             let sacrifice = (level / found.optimum.level - 1.0).max(0.0) + PATH_SACRIFICE;
+            if sacrifice > most {
+                return None;
+            }
             levels.set(group, &found.optimum, sacrifice);
             parts.extend(passed.iter().cloned());
         }

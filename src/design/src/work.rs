@@ -1,0 +1,126 @@
+//! How much memory and arithmetic a design asks for, known before it begins.
+//!
+//! The state feedback's inequalities take by far the most. With augmented states `d`, `L` Lyapunov
+//! matrices and a gain of `r` rows in each of `M` modes that are solved together, the Newton matrix has
+//! `R = L d (d + 1) / 2 + 1` rows after `M` parts of `r d` rows each are eliminated.
+
+use crate::{ControlSpec, Lyapunov};
+use ftc_plant::Dimensions;
+
+/// The most memory that a design may take for its Newton matrix, in bytes.
+const MOST_BYTES: f64 = 4e9;
+
+/// Iterations of a usual solution and of the one that centres it.
+const ITERATIONS: f64 = 40.0;
+
+/// Arithmetic operations in a second, roughly.
+const PER_SECOND: f64 = 3e9;
+
+/// What a state feedback takes, within a factor of a few.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Work {
+    /// Memory of the Newton matrix and its factors, in bytes.
+    pub bytes: f64,
+    /// Seconds of one processor.
+    pub seconds: f64,
+}
+
+impl Work {
+    /// Of a plant with these sizes and so many modes.
+    pub fn new(dims: Dimensions, modes: usize, spec: &ControlSpec) -> Self {
+        let tracked = spec.tracked.len() * (1 + 2 * spec.resonators.len());
+        let order = (dims.states + spec.latency * dims.inputs + tracked) as f64;
+        let (modes, inputs) = (modes as f64, dims.inputs as f64);
+        let (together, matrices, rows) = match spec.lyapunov {
+            Lyapunov::Common => (modes, 1.0, inputs),
+            Lyapunov::Dwell => (1.0, 1.0, inputs),
+            Lyapunov::Switched => (modes, modes, order + inputs),
+        };
+        let reduced = matrices * order * (order + 1.0) / 2.0 + 1.0;
+        let part = rows * order;
+        // The matrix and its factor, of what is left and of every part, and what couples them.
+        let numbers = reduced * reduced + together * part * (part + reduced);
+        let elimination = part * part * part / 3.0 + part * reduced * (part + reduced);
+        let operations = reduced * reduced * reduced / 3.0 + together * elimination;
+        Self {
+            bytes: 2.0 * 8.0 * numbers,
+            seconds: modes / together * ITERATIONS * operations / PER_SECOND,
+        }
+    }
+
+    /// Refuses what would exhaust a computer.
+    ///
+    /// # Errors
+    /// One sentence with the estimate and what to change.
+    pub fn check(&self, spec: &ControlSpec) -> Result<(), String> {
+        if self.bytes <= MOST_BYTES {
+            return Ok(());
+        }
+        let others = match spec.lyapunov {
+            Lyapunov::Dwell => "",
+            Lyapunov::Common | Lyapunov::Switched => {
+                ", or set controller.lyapunov = \"dwell\", which solves one mode at a time"
+            }
+        };
+        Err(format!(
+            "the inequalities of this design would take about {:.0} GB of memory and {}, but at most {:.0} GB are \
+             taken: reduce the number of states, inputs or modes{others}",
+            self.bytes / 1e9,
+            self.time(),
+            MOST_BYTES / 1e9,
+        ))
+    }
+
+    /// The time in words.
+    pub fn time(&self) -> String {
+        match self.seconds {
+            seconds if seconds < 90.0 => format!("{seconds:.0} s"),
+            seconds if seconds < 5400.0 => format!("{:.0} minutes", seconds / 60.0),
+            seconds => format!("{:.0} hours", seconds / 3600.0),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn work(states: usize, modes: usize, lyapunov: Lyapunov) -> Result<Work, String> {
+        let half = (states / 2).max(1);
+        let dims = Dimensions {
+            states,
+            inputs: half,
+            outputs: half,
+            disturbances: 1,
+        };
+        let spec = ControlSpec {
+            lyapunov,
+            ..ControlSpec::new(dims)
+        };
+        let work = Work::new(dims, modes, &spec);
+        work.check(&spec).map(|()| work)
+    }
+
+    #[test]
+    fn what_exhausts_memory_is_refused_with_its_size() {
+        let refused = work(64, 64, Lyapunov::Common).unwrap_err();
+        assert!(refused.contains("GB"), "{refused}");
+        assert!(refused.contains("dwell"), "{refused}");
+        assert!(work(64, 64, Lyapunov::Switched).is_err());
+    }
+
+    #[test]
+    fn what_is_practical_is_taken() {
+        for (states, modes, lyapunov) in [
+            (24, 2, Lyapunov::Common),
+            (16, 4, Lyapunov::Common),
+            (8, 4, Lyapunov::Switched),
+            (48, 4, Lyapunov::Dwell),
+            (64, 64, Lyapunov::Dwell),
+        ] {
+            work(states, modes, lyapunov).unwrap();
+        }
+        assert!(work(2, 2, Lyapunov::Common).unwrap().seconds < 0.1);
+        assert!(work(40, 4, Lyapunov::Common).unwrap().seconds > 60.0);
+    }
+}

@@ -1,0 +1,13 @@
+#!/usr/bin/env bash
+# Prints CARGO_ENCODED_RUSTFLAGS with the given flags and those that keep the paths of this machine out
+# of a binary: the places of panics are then said by crate alone.
+set -euo pipefail
+cd "$(dirname "$0")/../.."
+
+flags=("$@" "--remap-path-prefix=$PWD/=")
+for index in "${CARGO_HOME:-$HOME/.cargo}"/registry/src/*/; do
+    flags+=("--remap-path-prefix=$index=")
+done
+# The standard library's sources, where they are installed or built along.
+flags+=("--remap-path-prefix=$("${RUSTC:-rustc}" --print sysroot)/lib/rustlib/src/rust=rust")
+(IFS=$'\x1f' && printf '%s' "${flags[*]}")
