@@ -436,9 +436,7 @@ impl Bank {
             let mut sum = model.state_offset[i]
                 + dot(&model.a[i * n..(i + 1) * n], &state.own)
                 + dot(&model.e[i * d..(i + 1) * d], &z[n..n + d]);
-            for j in 0..m {
-                sum += model.b[i * m + j] * u[j];
-            }
+            sum += dot(&model.b[i * m..(i + 1) * m], u);
             state.scratch[i] = crate::kernel::bounded(sum);
         }
         state.own.copy_from_slice(&state.scratch[..n]);
