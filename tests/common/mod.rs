@@ -247,7 +247,12 @@ pub fn state_based(channel: Channel, noise: f64) -> ControllerParameters {
         harmonics: 1,
         amplitude: None,
     };
-    let settings = HypothesesSpec::default().settings(&plant, &signals, Some(&known));
+    let settings = HypothesesSpec::default().settings(
+        &plant,
+        &signals,
+        vec![noise.max(1e-3 / 6.0); dims.outputs],
+        Some(&known),
+    );
     parameters.estimator.method = EstimatorMethod::Observer;
     parameters.estimator.hypotheses = Some(settings);
     parameters

@@ -83,6 +83,24 @@ def test_readings_held_within_a_coarse_step_accuse_nobody(example_case: Callable
         np.testing.assert_array_equal(flagged, controller.get("fault_real"))
 
 
+def test_a_model_that_is_a_little_wrong_is_no_wrong_coupling(tmp_path: Path, capfd: pytest.CaptureFixture) -> None:
+    """Entries of the true plant's matrices off by up to 15 %: the right coupling is silent, the wrong one is told.
+
+    promise: wrong-delay
+    """
+    for example, right in [("paper", False), ("paper_latency", True)]:
+        out = tmp_path / example
+        out.mkdir()
+        design = out / f"{example}.toml"
+        text = (commands.ROOT / "examples" / f"{example}.toml").read_text()
+        design.write_text(f"{text}\n[scenario.plant]\nrelative_error = 0.15\nseed = 1\n")
+        fmus = commands.export(design, out)
+        for parallel in (right, not right):
+            fmu_loop.run(fmus, 600, fmu_loop.Schedule(parallel=parallel))
+            told = "of delay in the loop than the design allows for" in capfd.readouterr().out
+            assert told == (parallel != right), (example, parallel)
+
+
 def test_fmpy_simulate_accuses_no_sensor(example_case: Callable[[str], Case], capfd: pytest.CaptureFixture) -> None:
     """`fmpy simulate` on the converter's controller: no inputs, steps of four samples, no mode told."""
     result = fmpy.simulate_fmu(str(example_case("converter").fmus.controller))

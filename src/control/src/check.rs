@@ -321,10 +321,12 @@ fn hypotheses(settings: &Hypotheses, sizes: Sizes) -> Checked {
         )?;
     }
     for (what, values, needed) in [
+        ("noise", &settings.noise, p),
         ("fault_size", &settings.fault_size, p),
         ("authority", &settings.authority, p),
         ("input_load", &settings.input_load, m),
         ("disturbance_load", &settings.disturbance_load, s),
+        ("disturbance_walk", &settings.disturbance_walk, s),
         (
             "disturbance_size",
             &settings.disturbance_size,
@@ -348,7 +350,6 @@ fn hypotheses(settings: &Hypotheses, sizes: Sizes) -> Checked {
         settings.release_rate,
         settings.change_rate,
         settings.load_rate,
-        settings.load_moving,
     ];
     let sensible = rates.iter().all(|rate| (1e-100..=0.999).contains(rate));
     range(
@@ -357,7 +358,7 @@ fn hypotheses(settings: &Hypotheses, sizes: Sizes) -> Checked {
         "must have rates from 1e-100 to 0.999",
     )?;
     let shares = [
-        settings.surprise,
+        settings.changed_error,
         settings.odds,
         settings.fault_walk,
         settings.drift_walk,

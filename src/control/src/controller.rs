@@ -157,7 +157,8 @@ impl Controller {
             &parameters.estimator.hypotheses,
         ) {
             (EstimatorMethod::Observer, Some(settings)) => {
-                Some(Bank::new(&parameters.modes, settings))
+                let thresholds = &parameters.estimator.thresholds;
+                Some(Bank::new(&parameters.modes, settings, thresholds))
             }
             _ => None,
         };

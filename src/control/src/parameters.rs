@@ -231,6 +231,8 @@ pub struct Channels {
 pub struct Hypotheses {
     /// How the disturbance enters, per mode.
     pub channels: Vec<Channels>,
+    /// Standard deviation of the noise of each sensor (p), output units.
+    pub noise: Vec<f64>,
     /// Faults per sample and sensor.
     pub fault_rate: f64,
     /// Freezes per sample and sensor.
@@ -241,10 +243,8 @@ pub struct Hypotheses {
     pub change_rate: f64,
     /// Jumps of loads or of input gains per sample.
     pub load_rate: f64,
-    /// Probability that a load that moves goes on moving in the next sample.
-    pub load_moving: f64,
-    /// What a sample costs at most while loads move, in log likelihood.
-    pub surprise: f64,
+    /// Relative error of the matrices of a plant that is no longer the model.
+    pub changed_error: f64,
     /// Log odds that an accusation must have against the best explanation without one.
     pub odds: f64,
     /// Standard deviation of a new fault (p), output units.
@@ -259,8 +259,10 @@ pub struct Hypotheses {
     pub disturbance_load: Vec<f64>,
     /// How far a load on the states themselves displaces them at rest (n), state units.
     pub state_load: Vec<f64>,
-    /// How far a load wanders per sample, relative to the size of its jumps.
+    /// How far a load on an input or a state wanders per sample, relative to the size of its jumps.
     pub load_walk: f64,
+    /// How far a load on each disturbance channel wanders per sample (s), its units.
+    pub disturbance_walk: Vec<f64>,
     /// Relative error of the entries of the plant's matrices.
     pub model_error: f64,
     /// Standard deviation of the relative error of an input's gain.

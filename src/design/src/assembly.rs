@@ -129,6 +129,12 @@ pub enum Threshold {
 /// The smallest threshold that is chosen automatically, relative to the nominal value.
 const SMALLEST_THRESHOLD: f64 = 1e-3;
 
+/// How many noise deviations a threshold usually is.
+const USUAL_SIGMAS: f64 = 6.0;
+
+/// Noise that the state-based estimator believes in at least, relative to the threshold.
+const SMALLEST_NOISE: f64 = 0.05;
+
 /// Leverage beyond which the residual is not trusted.
 pub(crate) const LEVERAGE_LIMIT: f64 = 100.0;
 
@@ -303,8 +309,9 @@ fn estimator(request: &Request, dims: Dimensions) -> Result<Estimator, RequestEr
     });
     let hypotheses = state_based.then(|| {
         let known = spec.disturbance.as_ref();
+        let noise = sensor_noise(&request.scenario.noise, &thresholds);
         spec.hypotheses
-            .settings(&request.plant, &request.signals, known)
+            .settings(&request.plant, &request.signals, noise, known)
     });
     Ok(Estimator {
         method: spec.method,
@@ -321,6 +328,18 @@ fn estimator(request: &Request, dims: Dimensions) -> Result<Estimator, RequestEr
         leverage_limit: LEVERAGE_LIMIT,
         largest_fault: largest_faults(outputs),
     })
+}
+
+/// Standard deviation of each sensor's noise (p) for the state-based estimator: that of the scenario, and
+/// never below what the smallest threshold stands for.
+pub(crate) fn sensor_noise(given: &[f64], thresholds: &[f64]) -> Vec<f64> {
+    let sensors = given.iter().zip(thresholds);
+    sensors
+        .map(|(&noise, &threshold)| match noise > 0.0 {
+            true => noise.max(SMALLEST_NOISE * threshold),
+            false => threshold / USUAL_SIGMAS,
+        })
+        .collect()
 }
 
 /// The response length asked for, or the one after which the response has decayed.

@@ -5,6 +5,7 @@
 
 use crate::assembly::{self, KnownDisturbance};
 use crate::harmonics;
+use crate::hypotheses;
 use crate::matrices::dense;
 use crate::observer::{check_decoupling, lost_gains_fit};
 use crate::{Design, HypothesesSpec, Synthesis};
@@ -275,9 +276,10 @@ fn hypotheses_fit(design: &Design) -> bool {
     let known = found.angles.first().map(|&angle| KnownDisturbance {
         period: core::f64::consts::TAU * plant.sample_time / angle,
         harmonics: found.angles.len(),
-        amplitude: Some(found.disturbance_load.clone()),
+        amplitude: hypotheses::amplitude_is_known(found).then(|| found.disturbance_load.clone()),
     });
-    let mut derived = spec.settings(plant, &design.signals, known.as_ref());
+    let noise = assembly::sensor_noise(&design.scenario.noise, &estimator.thresholds);
+    let mut derived = spec.settings(plant, &design.signals, noise, known.as_ref());
     let turns = derived.angles.iter().zip(&found.angles);
     let same_turns = turns.clone().all(|(a, b)| (a - b).abs() <= 1e-12 * a.abs());
     derived.angles.clone_from(&found.angles);

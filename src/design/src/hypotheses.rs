@@ -43,12 +43,10 @@ const STUCK_RATE: f64 = 1e-7;
 const CHANGE_RATE: f64 = 1e-3;
 /// Jumps of loads or input gains per sample: as rare as faults.
 const LOAD_RATE: f64 = 1e-5;
-/// Probability that a load that moves goes on moving in the next sample.
-const LOAD_MOVING: f64 = 0.05;
-/// What a sample costs at most while loads move, in log likelihood.
-const SURPRISE: f64 = 2.0;
-/// Log odds of an accusation against the best explanation without one: 400 to 1.
-const ODDS: f64 = 6.0;
+/// Relative error of the matrices of a plant that is no longer the model.
+const CHANGED_ERROR: f64 = 1.0;
+/// Log odds of an accusation against the best explanation without one: 20 to 1.
+const ODDS: f64 = 3.0;
 /// Wander of an abrupt fault per sample, in noise deviations.
 const FAULT_WALK: f64 = 0.05;
 /// Wander of a fault that grew slowly per sample, in noise deviations.
@@ -65,31 +63,39 @@ const INPUT_LOAD: f64 = 0.2;
 const STATE_LOAD: f64 = 0.03;
 /// Wander of a load per sample relative to the size of its jumps.
 const LOAD_WALK: f64 = 5e-3;
+/// Wander of a disturbance of known size per sample, relative to that size: what a sine with a period of
+/// ninety samples does at most.
+const DISTURBANCE_WALK: f64 = 0.07;
 /// Relative error of an input's gain, and its wander per sample.
 const GAIN_ERROR: f64 = 0.3;
 const GAIN_WALK: f64 = 1e-4;
 /// Relative error of the disturbance's period.
 const PERIOD_ERROR: f64 = 0.05;
 /// How far the disturbance may move an output where its size is not known, relative to nominal.
-const DISTURBANCE: f64 = 0.3;
+const DISTURBANCE: f64 = 0.05;
 /// Error of the state at the start relative to its nominal value.
 const START: f64 = 3e-3;
 
 impl HypothesesSpec {
-    /// The estimator's sizes and rates for `plant` with these signals, under the disturbance that is
-    /// `known`.
+    /// The estimator's sizes and rates for `plant` with these signals and this `noise` of the sensors (p), under
+    /// the disturbance that is `known`.
     pub fn settings(
         &self,
         plant: &SwitchedPlant,
         signals: &Signals,
+        noise: Vec<f64>,
         known: Option<&KnownDisturbance>,
     ) -> Hypotheses {
         let scaling = signals.scaling();
         let outputs = &signals.outputs;
-        let disturbance = known
+        let amplitude = known
             .and_then(|known| known.amplitude.clone())
-            .filter(|sizes| sizes.iter().all(|&size| size > 0.0))
-            .unwrap_or_else(|| unknown_disturbance(plant, &scaling.outputs));
+            .filter(|sizes| sizes.iter().all(|&size| size > 0.0));
+        let walk = match amplitude {
+            Some(_) => DISTURBANCE_WALK,
+            None => LOAD_WALK,
+        };
+        let disturbance = amplitude.unwrap_or_else(|| unknown_disturbance(plant, &scaling.outputs));
         let angles = known.map_or_else(Vec::new, |known| known.angles(plant.sample_time));
         let waves = disturbance
             .iter()
@@ -100,13 +106,13 @@ impl HypothesesSpec {
         });
         Hypotheses {
             channels: channels.collect(),
+            noise,
             fault_rate: self.fault_rate,
             stuck_rate: STUCK_RATE,
             release_rate: 1.0 / self.fault_length,
             change_rate: CHANGE_RATE,
             load_rate: LOAD_RATE,
-            load_moving: LOAD_MOVING,
-            surprise: SURPRISE,
+            changed_error: CHANGED_ERROR,
             odds: ODDS,
             fault_size: per_sensor(plant, outputs, FAULT_OF_RANGE, FAULT_SIZE),
             fault_walk: FAULT_WALK,
@@ -116,6 +122,7 @@ impl HypothesesSpec {
                 .clone()
                 .unwrap_or_else(|| scaled(&scaling.inputs, INPUT_LOAD)),
             disturbance_size: waves.collect(),
+            disturbance_walk: scaled(&disturbance, walk),
             disturbance_load: disturbance,
             state_load: scaled(&scaling.states, STATE_LOAD),
             load_walk: LOAD_WALK,
@@ -134,6 +141,11 @@ impl HypothesesSpec {
             ambiguous: self.ambiguous,
         }
     }
+}
+
+/// Whether these sizes and rates were made for a disturbance of known amplitude.
+pub(crate) fn amplitude_is_known(settings: &Hypotheses) -> bool {
+    settings.disturbance_walk == scaled(&settings.disturbance_load, DISTURBANCE_WALK)
 }
 
 fn scaled(values: &[f64], factor: f64) -> Vec<f64> {

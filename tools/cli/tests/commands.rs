@@ -440,6 +440,47 @@ fn an_fmu_holds_every_platform_that_is_there_and_belongs_to_its_design() {
     }
 }
 
+/// Disturbances may be named as the other signals are; the plant FMU's inputs and outputs tell them.
+#[test]
+fn a_disturbance_has_the_name_and_unit_it_was_given() {
+    let named = |list: &str| {
+        SOUND.replacen(
+            "[signals]\n",
+            &format!("[signals]\ndisturbances = {list}\n"),
+            1,
+        )
+    };
+    let bench = Bench::new(named(
+        "[{ name = \"load torque\", unit = \"N.m\", nominal = 2.0 }]",
+    ));
+    let binaries = [
+        "fmu-binaries/linux64/ftc_controller.so",
+        "fmu-binaries/linux64/ftc_plant.so",
+    ];
+    let output = export(&bench, &installed(&bench, &binaries), "out");
+    assert!(
+        output.status.success(),
+        "{}",
+        String::from_utf8_lossy(&output.stderr)
+    );
+    let files = unzip(&bench.path("out/sound_plant.fmu"));
+    let xml = String::from_utf8(files["modelDescription.xml"].clone()).unwrap();
+    assert!(xml.contains("load torque"), "{xml}");
+    assert!(
+        xml.contains("unit=\"N.m\" relativeQuantity=\"true\" nominal=\"2.0\""),
+        "{xml}"
+    );
+    for (list, key) in [
+        ("[{}, {}]", "signals.disturbances"),
+        ("[{ name = \"a\\u0001\" }]", "signals.disturbances[1].name"),
+        ("[{ unit = \"\\uffff\" }]", "signals.disturbances[1].unit"),
+    ] {
+        let run = Bench::new(named(list)).run(&["design", FILE]);
+        assert_eq!(run.code(), 2, "{}", run.stderr());
+        assert!(run.stderr().contains(key), "{}", run.stderr());
+    }
+}
+
 /// Binaries of another platform that are older than those of this machine were made from other sources.
 #[cfg(target_os = "linux")]
 #[test]

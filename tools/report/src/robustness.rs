@@ -20,6 +20,10 @@ const WORSE: f64 = 0.01;
 /// Errors (root mean square, relative to the nominal value of the output) below this one do not matter.
 const NEGLIGIBLE: f64 = 1e-3;
 
+/// A loop is lost where its true error is larger than that of the scenario as it is, and than the output's
+/// nominal value, by this factor.
+const LOST: f64 = 30.0;
+
 /// One case and what came of it.
 pub struct Case {
     /// What differs from the scenario, in words.
@@ -134,10 +138,32 @@ fn is_worse(with: f64, without: f64, nominal: f64) -> bool {
     with.sqrt() > NEGLIGIBLE * nominal && with > (1.0 + WORSE) * without
 }
 
-/// A sentence for every case and output in which fault tolerance does worse than none.
+/// Whether a loop is lost: its true error is large beside the output's nominal value and beside that of
+/// the scenario as it is, with fault tolerance and without.
+fn is_lost(case: &Case, usual: &Case, index: usize, nominal: f64) -> bool {
+    let least = |case: &Case| case.with[index].min(case.without[index]).sqrt();
+    least(case) > LOST * least(usual).max(nominal)
+}
+
+/// A sentence for every case in which the loop is lost, whatever the fault tolerance does, and for every
+/// case and output in which fault tolerance does worse than none.
 pub fn warnings(design: &Design, cases: &[Case]) -> Vec<String> {
     let tracked = &design.controller.feedback.tracked;
-    let worse = cases.iter().flat_map(|case| {
+    let Some(usual) = cases.first() else {
+        return Vec::new();
+    };
+    let nominal = |row: usize| design.signals.outputs[row].nominal;
+    let (lost, kept): (Vec<&Case>, Vec<&Case>) = cases.iter().partition(|case| {
+        let mut rows = tracked.iter().enumerate();
+        rows.any(|(index, &row)| is_lost(case, usual, index, nominal(row)))
+    });
+    let lost = lost.into_iter().map(|case| {
+        format!(
+            "{}: the loop is unstable: if that may happen, try a smaller controller.integral_weight or a larger input_weight",
+            case.name
+        )
+    });
+    let worse = kept.into_iter().flat_map(|case| {
         let outputs = tracked.iter().zip(case.with.iter().zip(&case.without));
         outputs.filter_map(|(&row, (&with, &without))| {
             let output = &design.signals.outputs[row];
@@ -150,7 +176,7 @@ pub fn warnings(design: &Design, cases: &[Case]) -> Vec<String> {
             })
         })
     });
-    worse.collect()
+    lost.chain(worse).collect()
 }
 
 /// The section of the page.
@@ -235,7 +261,21 @@ pub fn json(cases: &[Case], warnings: &[String]) -> Value {
 
 #[cfg(test)]
 mod tests {
-    use super::is_worse;
+    use super::{Case, is_lost, is_worse};
+
+    #[test]
+    fn a_loop_is_lost_where_both_variants_are() {
+        let case = |with: f64, without: f64| Case {
+            name: String::new(),
+            with: vec![with],
+            without: vec![without],
+        };
+        let usual = case(0.01, 0.02);
+        assert!(is_lost(&case(1e4, f64::INFINITY), &usual, 0, 1.0));
+        assert!(!is_lost(&case(0.5, 1e9), &usual, 0, 1.0));
+        assert!(!is_lost(&case(1e4, 1e4), &case(1e4, 1e4), 0, 1.0));
+        assert!(!is_lost(&case(1e4, 1e4), &usual, 0, 1e3));
+    }
 
     #[test]
     fn worse_is_what_is_larger_and_matters() {

@@ -55,6 +55,15 @@ fn missing_empty_truncated_and_damaged_designs_are_refused() {
     }
 }
 
+/// The text with another number under a key: one that asks for all the memory there is.
+fn with_size(text: &str, key: &str) -> String {
+    let key = format!("\"{key}\":");
+    let (before, after) = text.split_once(&key).unwrap();
+    let rest = after.trim_start_matches(|c: char| c.is_ascii_digit());
+    assert!(rest.len() < after.len());
+    format!("{before}{key}1000000000000000{rest}")
+}
+
 /// A design that fits its guid, as somebody who forges both could make it.
 #[test]
 fn designs_of_another_layout_or_of_other_sizes_are_refused() {
@@ -64,6 +73,8 @@ fn designs_of_another_layout_or_of_other_sizes_are_refused() {
         text.replacen(&format!("\"format\":{FORMAT}"), "\"format\":0", 1),
         text.replacen("\"tracked\":[0,1]", "\"tracked\":[0,7]", 1),
         text.replacen("\"noise\":[0.005,0.005]", "\"noise\":[0.005]", 1),
+        with_size(&text, "response_length"),
+        with_size(&text, "window"),
         "{}".to_string(),
         "[".repeat(1_000_000),
     ];

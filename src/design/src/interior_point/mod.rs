@@ -112,7 +112,7 @@ const START: f64 = 10.0;
 const PRIMAL: f64 = 1e-8;
 
 /// Largest residual of the multipliers that counts as none.
-const DUAL: f64 = 1e-5;
+const DUAL: f64 = 1e-7;
 
 /// A gap of slacks and multipliers this far below what is asked for brings nothing any more.
 const EXHAUSTED: f64 = 0.1;

@@ -6,6 +6,7 @@ use super::{Claim, Scaled, Subject, SwitchingGain, prove_switching};
 use crate::Lyapunov;
 use crate::blocks::{BlockKind, BlockName};
 use crate::certificate::FactoredLyapunov;
+use crate::interior_point::{Block, Congruence, Problem as Structured, Settings, maximise};
 use crate::lmi::{Inequality, Problem, Variable};
 use crate::riccati;
 use nalgebra::DMatrix;
@@ -16,6 +17,14 @@ const MOST_UNKNOWNS: usize = 400;
 
 /// What the storage function must lose beside the signal, in coordinates in which it is near one.
 const STRICTNESS: f64 = 1e-6;
+
+/// When the method that uses the structure has the level.
+const SETTINGS: Settings = Settings {
+    gap: 1e-5,
+    absolute_gap: 1e-9,
+    enough: f64::INFINITY,
+    iterations: 60,
+};
 
 /// By how much the level may lie above the solver's, tried in turn.
 const ALLOWANCES: [f64; 4] = [1e-4, 1e-3, 1e-2, 3e-2];
@@ -110,48 +119,136 @@ impl Normalisation {
     }
 }
 
-/// The least level and the functions that reach it, in normalised coordinates.
+/// The least level and the functions that reach it, in the coordinates of the normal.
 fn least(
     modes: usize,
     loops: &[(usize, usize, Scaled)],
     normal: &Normalisation,
     each: bool,
 ) -> Option<(f64, Vec<DMatrix<f64>>)> {
+    let demands = demands(modes, loops, normal, each);
+    let count = if each { modes } else { 1 };
+    let found = by_structure(count, &demands).or_else(|| by_general_solver(count, &demands));
+    found.map(|(level, functions)| (level.max(0.0).sqrt() * normal.level, functions))
+}
+
+/// `P_own - [A B]'P_next[A B] - [C D]'[C D] - strictness` with the level on the disturbance's diagonal.
+struct Demand {
+    own: usize,
+    next: usize,
+    name: BlockName,
+    /// `[A B]`.
+    step: DMatrix<f64>,
+    /// `[C D]'[C D]` and the strictness.
+    signal: DMatrix<f64>,
+}
+
+/// What every pair of modes demands.
+fn demands(
+    modes: usize,
+    loops: &[(usize, usize, Scaled)],
+    normal: &Normalisation,
+    each: bool,
+) -> Vec<Demand> {
     let size = normal.basis.nrows();
-    let mut problem = Problem::new();
-    let functions: Vec<Variable> = (0..if each { modes } else { 1 })
-        .map(|_| problem.symmetric(size))
-        .collect();
-    let level = problem.scalar();
-    let function = |mode: usize| functions[if each { mode } else { 0 }].expression();
-    let strict = DMatrix::identity(size, size) * STRICTNESS;
+    let beside = |left: &DMatrix<f64>, right: &DMatrix<f64>| {
+        DMatrix::from_fn(
+            left.nrows(),
+            left.ncols() + right.ncols(),
+            |row, column| match column.checked_sub(left.ncols()) {
+                None => left[(row, column)],
+                Some(column) => right[(row, column)],
+            },
+        )
+    };
+    let mut demands = Vec::new();
     for (i, j, scaled) in loops {
         let channel = scaled.channel();
         let a = &normal.inverse * channel.a.midpoint() * &normal.basis;
         let b = &normal.inverse * channel.b.midpoint() / normal.level;
-        let c = channel.c.midpoint() * &normal.basis;
-        let d = channel.d.midpoint() / normal.level;
+        let both = beside(
+            &(channel.c.midpoint() * &normal.basis),
+            &(channel.d.midpoint() / normal.level),
+        );
+        let mut signal = both.tr_mul(&both);
+        for k in 0..size {
+            signal[(k, k)] += STRICTNESS;
+        }
+        let step = beside(&a, &b);
         let followers: Vec<usize> = match each && i == j {
             true => (0..modes).collect(),
             false => vec![*j],
         };
-        for next in followers {
-            let after = function(next);
-            let state = function(*i)
-                - &a.transpose() * after.clone() * &a
-                - (c.tr_mul(&c) + &strict).into();
-            let cross = -(&b.transpose() * after.clone() * &a) - d.tr_mul(&c).into();
-            let input =
-                level.times_identity(b.ncols()) - &b.transpose() * after * &b - d.tr_mul(&d).into();
-            problem.require(Inequality::new(
-                BlockName::new(BlockKind::RunningLoop, *i, next),
-                vec![vec![Some(state)], vec![Some(cross), Some(input)]],
-            ));
+        let index = |mode: usize| if each { mode } else { 0 };
+        demands.extend(followers.into_iter().map(|next| Demand {
+            own: index(*i),
+            next: index(next),
+            name: BlockName::new(BlockKind::RunningLoop, *i, next),
+            step: step.clone(),
+            signal: signal.clone(),
+        }));
+    }
+    demands
+}
+
+/// By the method that uses the structure: the level is minus the scalar unknown.
+fn by_structure(count: usize, demands: &[Demand]) -> Option<(f64, Vec<DMatrix<f64>>)> {
+    let size = demands.first()?.step.nrows();
+    let block = |demand: &Demand| {
+        let rows = demand.step.ncols();
+        let congruence = |unknown, sign, map| Congruence { unknown, sign, map };
+        let disturbance = |row: usize, column: usize| match row == column && row >= size {
+            true => -1.0,
+            false => 0.0,
+        };
+        Block {
+            constant: -&demand.signal,
+            congruences: vec![
+                congruence(demand.own, 1.0, DMatrix::identity(rows, size)),
+                congruence(demand.next, -1.0, demand.step.transpose()),
+            ],
+            product: None,
+            scalar: Some(DMatrix::from_fn(rows, rows, disturbance)),
         }
+    };
+    let problem = Structured {
+        order: size,
+        symmetric: count,
+        full: Vec::new(),
+        blocks: demands.iter().map(block).collect(),
+        bounds: Vec::new(),
+        total: None,
+    };
+    let found = maximise(&problem, SETTINGS, &mut |_| ())?;
+    let sound = found.converged && found.feasible;
+    sound.then(|| (-found.value, found.point.symmetric))
+}
+
+/// By the general solver.
+fn by_general_solver(count: usize, demands: &[Demand]) -> Option<(f64, Vec<DMatrix<f64>>)> {
+    let size = demands.first()?.step.nrows();
+    let mut problem = Problem::new();
+    let functions: Vec<Variable> = (0..count).map(|_| problem.symmetric(size)).collect();
+    let level = problem.scalar();
+    for demand in demands {
+        let [own, next] = [demand.own, demand.next].map(|index| functions[index].expression());
+        let rows = demand.step.ncols();
+        let before = DMatrix::identity(rows, size);
+        let last = |row: usize, column: usize| f64::from(u8::from(row == size + column));
+        let disturbance = DMatrix::from_fn(rows, rows - size, last);
+        let levels = level.times_identity(rows - size);
+        let whole = &before * own * &before.transpose()
+            - &demand.step.transpose() * next * &demand.step
+            - demand.signal.clone().into()
+            + &disturbance * levels * &disturbance.transpose();
+        problem.require(Inequality::new(
+            demand.name.clone(),
+            vec![vec![Some(whole)]],
+        ));
     }
     let found = problem.minimise(&level).ok()?;
-    let reached = level.value(&found.scalars)[(0, 0)].max(0.0).sqrt();
+    let reached = level.value(&found.scalars)[(0, 0)];
     let values = functions.iter();
     let values = values.map(|function| riccati::symmetric(function.value(&found.scalars)));
-    Some((reached * normal.level, values.collect()))
+    Some((reached, values.collect()))
 }

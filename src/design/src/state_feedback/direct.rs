@@ -4,7 +4,8 @@
 use super::synthesis::{AGREEMENT, Levels, Optimum, Problem, RELAXATIONS, TRANSFORMATIONS};
 use super::transformation::{Part, Transformation};
 use super::{REJECTION, StateFeedback, riccati, structured};
-use crate::Lyapunov;
+use crate::verdict::{DesignError, Uncertified};
+use crate::{CertificateError, Lyapunov};
 
 /// Floating-point operations beyond which a `dwell` design is left to Riccati equations.
 const LARGEST_WORK: f64 = 6e11;
@@ -33,6 +34,43 @@ pub(super) struct Found {
     doubtful: bool,
 }
 
+/// Gains that a group may take.
+struct Choice<'a> {
+    /// What they give up of its level, relatively.
+    relaxation: f64,
+    /// Where they are there already; else those of largest margin.
+    ready: Option<&'a [Part]>,
+}
+
+impl Found {
+    /// From the least relaxation to the largest.
+    fn choices(&self) -> Vec<Choice<'_>> {
+        let path = self.centred.iter().rev().take(CENTRED);
+        let path = path.map(|(level, parts)| Choice {
+            relaxation: (level / self.optimum.level - 1.0).max(0.0) + PATH_RELAXATION,
+            ready: Some(parts),
+        });
+        let margins = RELAXATIONS.map(|relaxation| Choice {
+            relaxation,
+            ready: None,
+        });
+        let mut choices: Vec<Choice> = path.chain(margins).collect();
+        choices.sort_by(|a, b| a.relaxation.total_cmp(&b.relaxation));
+        choices
+    }
+}
+
+/// The mode (from 0) whose inequality could not be proved, where it is one mode's.
+fn unproved_mode(error: &DesignError) -> Option<usize> {
+    match error {
+        DesignError::Uncertified(Uncertified {
+            reason: CertificateError::Unproved(name),
+            ..
+        }) if name.mode == name.successor => Some(name.mode - 1),
+        _ => None,
+    }
+}
+
 impl Problem<'_> {
     /// The design from the coordinates of regulators; `None` where any part of it falls short.
     pub(super) fn direct(&self) -> Option<StateFeedback> {
@@ -48,7 +86,7 @@ impl Problem<'_> {
             self.settled_level(&regulated.with_signals(&self.models, group), group)
         });
         let mut least = least.collect::<Option<Vec<_>>>()?;
-        let [smallest, small, others @ ..] = RELAXATIONS;
+        let smallest = RELAXATIONS[0];
         if let Some(design) = self.with_margin(&groups, &least, smallest) {
             return Some(design);
         }
@@ -59,16 +97,8 @@ impl Problem<'_> {
                 *found = again;
             }
         }
-        let on_path =
-            |most: f64| (0..CENTRED).find_map(|back| self.on_path(&groups, &least, back, most));
         self.with_margin(&groups, &least, smallest)
-            .or_else(|| on_path(small))
-            .or_else(|| self.with_margin(&groups, &least, small))
-            .or_else(|| on_path(f64::INFINITY))
-            .or_else(|| {
-                let mut larger = others.iter();
-                larger.find_map(|more| self.with_margin(&groups, &least, *more))
-            })
+            .or_else(|| self.with_little(&groups, &least))
     }
 
     /// Gains of largest margin at the least levels, each increased by the factor `1 + relaxation`, certified.
@@ -87,28 +117,40 @@ impl Problem<'_> {
         self.certified(parts, Some(levels)).ok()
     }
 
-    /// Gains from the central path, `back` points before its end, certified; none where any group would
-    /// give up more than `most` of its level.
-    fn on_path(
-        &self,
-        groups: &[Vec<usize>],
-        least: &[Found],
-        back: usize,
-        most: f64,
-    ) -> Option<StateFeedback> {
-        let mut levels = Levels::new(self);
-        let mut parts = Vec::new();
-        for (group, found) in groups.iter().zip(least) {
-            let at = found.centred.len().checked_sub(1 + back)?;
-            let (level, passed) = &found.centred[at];
-            let relaxation = (level / found.optimum.level - 1.0).max(0.0) + PATH_RELAXATION;
-            if relaxation > most {
-                return None;
+    /// Gains that give up as little of its level as each group can: from the central path or of largest
+    /// margin, whichever comes next, until all are proved together.
+    fn with_little(&self, groups: &[Vec<usize>], least: &[Found]) -> Option<StateFeedback> {
+        let choices: Vec<Vec<Choice>> = least.iter().map(Found::choices).collect();
+        let mut taken = vec![0; groups.len()];
+        let mut parts: Vec<Option<Vec<Part>>> = vec![None; groups.len()];
+        loop {
+            let mut levels = Levels::new(self);
+            for (at, (group, found)) in groups.iter().zip(least).enumerate() {
+                while parts[at].is_none() {
+                    let choice = choices[at].get(taken[at])?;
+                    parts[at] = match choice.ready {
+                        Some(ready) => Some(ready.to_vec()),
+                        None => {
+                            let level = found.optimum.level * (1.0 + choice.relaxation);
+                            self.direct_centre(group, &found.optimum.transformation, level)
+                        }
+                    };
+                    taken[at] += 1;
+                }
+                let relaxation = choices[at][taken[at] - 1].relaxation;
+                levels.set(group, &found.optimum, relaxation);
             }
-            levels.set(group, &found.optimum, relaxation);
-            parts.extend(passed.iter().cloned());
+            let together = parts.iter().flatten().flatten().cloned().collect();
+            let failed = match self.certified(together, Some(levels)) {
+                Ok(design) => return Some(design),
+                Err(error) => unproved_mode(&error),
+            };
+            for (group, parts) in groups.iter().zip(&mut parts) {
+                if failed.is_none_or(|mode| group.contains(&mode)) {
+                    *parts = None;
+                }
+            }
         }
-        self.certified(parts, Some(levels)).ok()
     }
 
     /// Gains of largest margin at a level.

@@ -9,15 +9,17 @@ use alloc::vec::Vec;
 use serde::{Deserialize, Serialize};
 
 /// How far below the best a hypothesis may fall before it is dropped, in log likelihood.
-const MARGIN: f64 = 16.0;
+const MARGIN: f64 = 25.0;
 /// How far the explanation without sensor faults may fall: it is never forgotten.
-const MEMORY: f64 = 25.0;
+const MEMORY: f64 = 30.0;
 /// Hypotheses about the same sensors.
 const ALIKE: usize = 2;
 /// Squared whitened innovation below which nothing but "all goes on" is considered.
 pub(super) const QUIET: f64 = 8.0;
 /// Price of several sensors at once, relative to that of one.
 const TOGETHER: f64 = 1.5;
+/// Price of all loads at once, and of a plant that is no longer the model, relative to that of one load.
+pub(super) const UNLIKE: f64 = 2.0;
 /// Price of a fault before the first sample: one sensor in a hundred.
 const AT_START: f64 = -4.6;
 /// Mean of the relative error of a sensor's wrong gain.
@@ -30,8 +32,12 @@ const SCALE_VARIANCE: f64 = 0.25;
 pub(super) enum Action {
     /// All goes on.
     Stay,
-    /// Loads and input gains jump.
-    Load,
+    /// Loads jump, and input gains with them: the number of the jump.
+    Load(usize),
+    /// The plant is no longer the model: its matrices may be wrong in any way.
+    Loosen,
+    /// The plant is the model again.
+    Tighten,
     /// These sensors have a bias.
     Accuse(Sensors),
     /// This sensor's gain is wrong.
@@ -67,8 +73,8 @@ pub(super) struct Candidates {
 }
 
 impl Candidates {
-    /// For `outputs` sensors.
-    pub(super) fn new(outputs: usize) -> Self {
+    /// For `outputs` sensors and so many jumps of loads.
+    pub(super) fn new(outputs: usize, jumps: usize) -> Self {
         let none = Candidate {
             score: 0.0,
             parent: 0,
@@ -76,7 +82,7 @@ impl Candidates {
             convinced: false,
         };
         Self {
-            list: vec![none; super::SLOTS * (6 + 6 * outputs + outputs * outputs)],
+            list: vec![none; super::SLOTS * (6 + jumps + 6 * outputs + outputs * outputs)],
             count: 0,
         }
     }
@@ -118,10 +124,10 @@ impl Bank {
         let p = self.layout.p;
         let all = if p >= 64 { u64::MAX } else { (1 << p) - 1 };
         let h = &state.slots[slot];
-        let (score, accused, moving, convinced) = (h.score, h.accused(), h.moving, h.convinced);
+        let (score, accused, loose, convinced) = (h.score, h.accused(), h.loose, h.convinced);
         let likelihood = state.seen[slot].likelihood(p);
         let square = state.seen[slot].square;
-        let stay = score + likelihood + if moving { self.prices.settle } else { 0.0 };
+        let stay = score + likelihood;
         state.candidates.add(Candidate {
             score: stay,
             parent: slot,
@@ -129,21 +135,40 @@ impl Bank {
             convinced,
         });
         let unlikely = square > QUIET.min(4.0 + p as f64);
-        if unlikely || moving {
-            let price = if moving {
-                self.prices.moving
-            } else {
-                self.prices.load
-            };
-            let mut value = price + self.trial(state, slot, model, reading, Action::Load);
-            if moving {
-                value = value.max(likelihood + 0.5 * square.min(1e5) - self.settings.surprise);
+        if unlikely {
+            for jump in 0..model.jumps.len() {
+                let together = if jump == 0 {
+                    UNLIKE
+                } else if jump + 1 == model.jumps.len() {
+                    TOGETHER
+                } else {
+                    1.0
+                };
+                let value = together * self.prices.load
+                    + self.trial(state, slot, model, reading, Action::Load(jump));
+                state.candidates.add(Candidate {
+                    score: score + value,
+                    parent: slot,
+                    action: Action::Load(jump),
+                    convinced,
+                });
             }
-            let value = score + value;
+            if !loose {
+                let value =
+                    self.prices.changed + self.trial(state, slot, model, reading, Action::Loosen);
+                state.candidates.add(Candidate {
+                    score: score + value,
+                    parent: slot,
+                    action: Action::Loosen,
+                    convinced,
+                });
+            }
+        }
+        if loose {
             state.candidates.add(Candidate {
-                score: value,
+                score: score + likelihood + self.prices.release,
                 parent: slot,
-                action: Action::Load,
+                action: Action::Tighten,
                 convinced,
             });
         }
@@ -243,7 +268,7 @@ impl Bank {
             }
         }
         for q in 0..p {
-            if has(free, q) && state.evidence[q] > FREEZING {
+            if has(free, q) && state.evidence[q] > FREEZING && slot == state.live.first() {
                 let value = score
                     + self.prices.stuck
                     + state.evidence[q]
@@ -309,15 +334,16 @@ impl Bank {
         let trial = &mut state.trial;
         trial.predict(layout, model, reading, h, kinds, bias);
         match action {
-            Action::Load => {
+            Action::Load(jump) => {
+                let jump = &model.jumps[jump];
                 let variance = self.settings.gain_error * self.settings.gain_error;
                 for q in 0..p {
                     for j in 0..=q {
                         if !has(reading.valid & !stuck, q) || !has(reading.valid & !stuck, j) {
                             continue;
                         }
-                        let mut sum = model.load_seen[q * p + j];
-                        for k in 0..m {
+                        let mut sum = jump.seen[q * p + j];
+                        for k in jump.gains.clone() {
                             sum += variance
                                 * (model.cb[q * m + k] * state.u[k])
                                 * (model.cb[j * m + k] * state.u[k]);
@@ -430,10 +456,45 @@ impl Bank {
                     };
                 }
             }
-            Action::Stay | Action::Release(_) => {}
+            Action::Loosen => {
+                for (i, variance) in self.looseness(model, h, &state.u).enumerate() {
+                    for q in 0..p {
+                        for j in 0..=q {
+                            if has(reading.valid & !stuck, q) && has(reading.valid & !stuck, j) {
+                                trial.s[q * p + j] +=
+                                    variance * model.c[q * n + i] * model.c[j * n + i];
+                            }
+                        }
+                    }
+                }
+            }
+            Action::Stay | Action::Tighten | Action::Release(_) => {}
         }
         trial.whiten(p);
         trial.likelihood(p)
+    }
+
+    /// Variance of what a plant unlike the model may have done to each state in a sample (n).
+    pub(super) fn looseness<'a>(
+        &'a self,
+        model: &'a ModeModel,
+        h: &'a Hypothesis,
+        u: &'a [f64],
+    ) -> impl Iterator<Item = f64> + 'a {
+        let Layout { n, m, .. } = self.layout;
+        let error = self.settings.changed_error * self.settings.changed_error;
+        (0..n).map(move |i| {
+            let mut sum = 0.0;
+            let row = &model.a[i * n..(i + 1) * n];
+            for ((&a, &x), &x0) in row.iter().zip(&h.before).zip(&model.x0) {
+                sum += a * a * (x - x0) * (x - x0);
+            }
+            let row = &model.b[i * m..(i + 1) * m];
+            for ((&b, &u), &u0) in row.iter().zip(u).zip(&model.u0) {
+                sum += b * b * (u - u0) * (u - u0);
+            }
+            error * sum
+        })
     }
 
     /// Variance of entry `k` of the model's own run.
@@ -446,7 +507,9 @@ impl Bank {
     fn sets(&self, h: &Hypothesis, action: Action) -> Kinds {
         let now = h.kinds();
         match action {
-            Action::Stay | Action::Load | Action::Start => now,
+            Action::Stay | Action::Load(_) | Action::Loosen | Action::Tighten | Action::Start => {
+                now
+            }
             Action::Home => Kinds {
                 additive: 0,
                 stuck: 0,
@@ -482,6 +545,17 @@ impl Bank {
         }
     }
 
+    /// Whom a candidate accuses, and whether the plant is no longer the model.
+    fn kind(&self, state: &BankState, candidate: &Candidate) -> (Sensors, bool) {
+        let parent = &state.slots[candidate.parent];
+        let loose = match candidate.action {
+            Action::Loosen => true,
+            Action::Tighten => false,
+            _ => parent.loose,
+        };
+        (self.sets(parent, candidate.action).all(), loose)
+    }
+
     /// Keeps the best candidates, few of a kind, and always one without an accusation.
     fn select(&self, state: &mut BankState) {
         let order = |a: &Candidate, b: &Candidate| {
@@ -496,27 +570,25 @@ impl Bank {
             .map(|c| c.score)
             .fold(f64::NEG_INFINITY, f64::max);
         let mut kept = 0;
-        let mut healthy = false;
+        let (mut tight, mut loose) = (false, false);
         for index in 0..state.candidates.count {
             let candidate = state.candidates.list[index];
-            let kinds = self.sets(&state.slots[candidate.parent], candidate.action);
-            let clean = kinds.all() == 0;
-            let protect = clean && !healthy;
-            if !protect && (candidate.score < best - MARGIN || kept >= KEEP - usize::from(!healthy))
-            {
+            let kind = self.kind(state, &candidate);
+            let clean = kind.0 == 0;
+            let protect = clean && !(if kind.1 { loose } else { tight });
+            let reserved = usize::from(!tight) + usize::from(!loose);
+            if !protect && (candidate.score < best - MARGIN || kept >= KEEP - reserved) {
                 continue;
             }
             let alike = state.candidates.list[..kept]
                 .iter()
-                .filter(|c| {
-                    self.sets(&state.slots[c.parent], c.action).all() == kinds.all()
-                        && c.convinced == candidate.convinced
-                })
+                .filter(|c| self.kind(state, c) == kind && c.convinced == candidate.convinced)
                 .count();
             if alike >= ALIKE {
                 continue;
             }
-            healthy |= clean;
+            tight |= clean && !kind.1;
+            loose |= clean && kind.1;
             let mut taken = candidate;
             taken.score = (candidate.score - best).clamp(-MEMORY, MEMORY);
             state.candidates.list[kept] = taken;
@@ -547,10 +619,17 @@ impl Bank {
             let kinds = self.sets(child, candidate.action);
             (child.additive, child.stuck, child.scaled) =
                 (kinds.additive, kinds.stuck, kinds.scaled);
-            child.moving = candidate.action == Action::Load;
+            match candidate.action {
+                Action::Loosen => child.loose = true,
+                Action::Tighten => child.loose = false,
+                _ => {}
+            }
             let fault = layout.fault();
             match candidate.action {
-                Action::Load => child.jump(layout, model, &state.u, self.settings.gain_error),
+                Action::Load(jump) => {
+                    let jump = &model.jumps[jump];
+                    child.jump(layout, model, jump, &state.u, self.settings.gain_error);
+                }
                 Action::Accuse(set) | Action::Change(set) => {
                     for q in 0..p {
                         if !has(set, q) {
@@ -600,8 +679,10 @@ impl Bank {
                     for k in 0..n {
                         let variance = self.own_variance(model, &state.own, k);
                         child.open(k, state.own[k], variance);
-                        child.open(layout.load() + k, 0.0, 0.01 * model.load[k * n + k]);
                         child.before[k] = state.own[k];
+                    }
+                    for (k, size) in model.load_size.iter().enumerate() {
+                        child.open(layout.load() + k, 0.0, 0.01 * size * size);
                     }
                     let _ = size;
                     for q in 0..p {
@@ -626,7 +707,17 @@ impl Bank {
                         }
                     }
                 }
-                Action::Stay => {}
+                Action::Loosen => {
+                    let (load, size) = (layout.load() + layout.state_load(), layout.size());
+                    for (i, v) in self.looseness(model, parent, &state.u).enumerate() {
+                        for (row, column) in
+                            [(i, i), (i, load + i), (load + i, i), (load + i, load + i)]
+                        {
+                            child.cov[row * size + column] += v;
+                        }
+                    }
+                }
+                Action::Stay | Action::Tighten => {}
             }
             let seen = &mut state.seen[free];
             let child = &state.slots[free];
@@ -640,14 +731,8 @@ impl Bank {
             h.update(layout, &mut state.seen[slot], bias);
             h.score = candidate.score;
             let price = match candidate.action {
-                Action::Stay | Action::Release(_) => 0.0,
-                Action::Load => {
-                    if h.moving && candidate.parent != slot {
-                        4.0
-                    } else {
-                        0.0
-                    }
-                }
+                Action::Stay | Action::Tighten | Action::Release(_) => 0.0,
+                Action::Load(_) | Action::Loosen => 0.0,
                 Action::Accuse(_)
                 | Action::Scale(_)
                 | Action::Freeze(_)
@@ -658,9 +743,6 @@ impl Bank {
             };
             h.misfit += RENEWED * (state.seen[slot].square.min(1e3) + price - h.misfit);
             h.convinced = candidate.convinced;
-            if candidate.action == Action::Stay {
-                h.moving = false;
-            }
         }
         state.live = next;
         // Whom to believe: an accusation must beat the best explanation without one by its odds.

@@ -4,7 +4,7 @@
 #![allow(clippy::needless_range_loop)]
 
 use super::linear::{axpy, dot, factor, solve};
-use super::model::{Layout, ModeModel};
+use super::model::{Jump, Layout, ModeModel};
 use crate::kernel::bounded;
 use crate::parameters::Hypotheses as Settings;
 use alloc::vec;
@@ -36,8 +36,8 @@ pub struct Hypothesis {
     pub scaled: Sensors,
     /// Whether what accuses its sensors could be nothing else.
     pub convinced: bool,
-    /// Whether its loads move now.
-    pub moving: bool,
+    /// Whether the plant is no longer the model.
+    pub loose: bool,
     /// Logarithm of its probability, up to a constant.
     pub score: f64,
     /// Running mean of how badly it fits.
@@ -77,7 +77,7 @@ pub struct Reading<'a> {
 crate::state!(Hypothesis {
     parts: [z, cov, before],
     constants: [],
-    counters: [additive, stuck, scaled, convinced, moving, score, misfit]
+    counters: [additive, stuck, scaled, convinced, loose, score, misfit]
 });
 crate::state!(Innovation {
     parts: [r, rows, s, weights, white],
@@ -264,7 +264,7 @@ impl Hypothesis {
             stuck: 0,
             scaled: 0,
             convinced: true,
-            moving: false,
+            loose: false,
             score: 0.0,
             misfit: layout.p as f64,
         }
@@ -284,7 +284,7 @@ impl Hypothesis {
         self.stuck = other.stuck;
         self.scaled = other.scaled;
         self.convinced = other.convinced;
-        self.moving = other.moving;
+        self.loose = other.loose;
         self.score = other.score;
         self.misfit = other.misfit;
     }
@@ -352,12 +352,17 @@ impl Hypothesis {
         du: &[f64],
         scratch: &mut [f64],
     ) {
-        let Layout { n, m, p, d } = layout;
+        let Layout { n, m, p, d, .. } = layout;
         let (size, load, gain, fault) =
             (layout.size(), layout.load(), layout.gain(), layout.fault());
         let active = self.active(layout, bias);
-        let error = settings.model_error * settings.model_error;
-        let walk = settings.load_walk * settings.load_walk;
+        let loads = layout.loads();
+        let error = if self.loose {
+            settings.changed_error
+        } else {
+            settings.model_error
+        };
+        let error = error * error;
         // The model's error acts as a load that moves as the state and the input move.
         let (moved, _) = scratch.split_at_mut(n);
         for ((out, before), &x) in moved.iter_mut().zip(&mut self.before).zip(&self.z) {
@@ -373,8 +378,11 @@ impl Hypothesis {
             for (&b, &s) in model.b[i * m..(i + 1) * m].iter().zip(du) {
                 sum += b * b * s * s;
             }
-            let k = load + i;
-            self.cov[k * size + k] += error * sum + walk * model.load[i * n + i];
+            let k = load + layout.state_load() + i;
+            self.cov[k * size + k] += error * sum;
+        }
+        for (k, wander) in (load..gain).zip(&model.load_walk) {
+            self.cov[k * size + k] += wander * wander;
         }
         for k in gain..fault {
             self.cov[k * size + k] += settings.gain_walk * settings.gain_walk;
@@ -417,11 +425,11 @@ impl Hypothesis {
                     );
                 }
             }
-            axpy(
-                row,
-                1.0,
-                &self.cov[(load + i) * size..(load + i) * size + active],
-            );
+            for (k, &factor) in (load..gain).zip(&model.g[i * loads..(i + 1) * loads]) {
+                if factor != 0.0 {
+                    axpy(row, factor, &self.cov[k * size..k * size + active]);
+                }
+            }
             for (j, (&b, &u)) in model.b[i * m..(i + 1) * m].iter().zip(u).enumerate() {
                 let factor = b * u;
                 if factor != 0.0 {
@@ -439,7 +447,7 @@ impl Hypothesis {
             for j in 0..=i {
                 let mut sum = dot(&row[..n], &model.a[j * n..(j + 1) * n])
                     + dot(&row[n..n + d], &model.e[j * d..(j + 1) * d])
-                    + row[load + j];
+                    + dot(&row[load..gain], &model.g[j * loads..(j + 1) * loads]);
                 for ((&r, &b), &u) in row[gain..fault]
                     .iter()
                     .zip(&model.b[j * m..(j + 1) * m])
@@ -460,7 +468,7 @@ impl Hypothesis {
         // The state.
         for i in 0..n {
             let mut sum = model.state_offset[i]
-                + self.z[load + i]
+                + dot(&model.g[i * loads..(i + 1) * loads], &self.z[load..gain])
                 + dot(&model.a[i * n..(i + 1) * n], &self.z[..n])
                 + dot(&model.e[i * d..(i + 1) * d], &self.z[n..n + d]);
             for ((&b, &u), &g) in model.b[i * m..(i + 1) * m]
@@ -529,8 +537,8 @@ impl Hypothesis {
             } else if k < n + d {
                 settings.disturbance_size[k - n] * settings.disturbance_size[k - n]
             } else if k < gain {
-                let i = k - load;
-                4.0 * model.load[i * n + i]
+                let size = model.load_size[k - load];
+                4.0 * (size * size).max(self.z[k] * self.z[k])
             } else if k < fault {
                 settings.gain_error * settings.gain_error
             } else if has(self.accused(), k - fault) {
@@ -568,20 +576,35 @@ impl Hypothesis {
         }
     }
 
-    /// The loads jump: `load` and the input gains, with effect on the state at once.
-    pub fn jump(&mut self, layout: Layout, model: &ModeModel, u: &[f64], gain_error: f64) {
+    /// Loads jump, and input gains with them, with effect on the state at once.
+    pub fn jump(
+        &mut self,
+        layout: Layout,
+        model: &ModeModel,
+        jump: &Jump,
+        u: &[f64],
+        gain_error: f64,
+    ) {
         let Layout { n, m, .. } = layout;
         let (size, load, gain) = (layout.size(), layout.load(), layout.gain());
-        for i in 0..n {
-            for j in 0..n {
-                let v = model.load[i * n + j];
-                self.cov[i * size + j] += v;
-                self.cov[i * size + load + j] += v;
-                self.cov[(load + i) * size + j] += v;
-                self.cov[(load + i) * size + load + j] += v;
+        let loads = layout.loads();
+        for k in jump.loads.clone() {
+            let variance = model.load_size[k] * model.load_size[k];
+            let at = load + k;
+            self.cov[at * size + at] += variance;
+            for i in 0..n {
+                let left = variance * model.g[i * loads + k];
+                if left == 0.0 {
+                    continue;
+                }
+                self.cov[i * size + at] += left;
+                self.cov[at * size + i] += left;
+                for j in 0..n {
+                    self.cov[i * size + j] += left * model.g[j * loads + k];
+                }
             }
         }
-        for k in 0..m {
+        for k in jump.gains.clone() {
             let variance = gain_error * gain_error;
             self.cov[(gain + k) * size + gain + k] += variance;
             for i in 0..n {

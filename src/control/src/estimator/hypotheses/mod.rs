@@ -30,11 +30,9 @@ use model::ModeModel;
 use serde::{Deserialize, Serialize};
 
 /// Most hypotheses that stay after a sample.
-const KEEP: usize = 8;
+const KEEP: usize = 12;
 /// Most hypotheses that may exist while a sample is judged.
 const SLOTS: usize = 2 * KEEP;
-/// How many noise deviations a threshold is.
-const SIGMAS: f64 = 6.0;
 /// Evidence of a frozen sensor from which it is considered, in log likelihood.
 const FREEZING: f64 = 4.0;
 /// Noise deviations (squared) from which loads are said to have moved an output.
@@ -50,6 +48,8 @@ pub struct Bank {
     settings: Hypotheses,
     rotation: Vec<(f64, f64)>,
     prices: Prices,
+    /// Noise deviation of each sensor over its threshold (p).
+    noise_per_threshold: Vec<f64>,
 }
 
 /// Logarithms of the probabilities per sample.
@@ -60,8 +60,7 @@ struct Prices {
     release: f64,
     change: f64,
     load: f64,
-    moving: f64,
-    settle: f64,
+    changed: f64,
 }
 
 /// The slots in use, the leading hypothesis first.
@@ -180,11 +179,12 @@ crate::state!(BankState {
 
 impl Bank {
     /// Judges the readings `y` (p) of a sample taken in `mode`; what is no measurement tells nothing.
-    /// The noise of each sensor follows from its threshold.
+    /// A threshold other than the design's scales the noise of its sensor.
     pub fn observe(&self, state: &mut BankState, mode: usize, y: &[f64], thresholds: &[f64]) {
         let mut noise = core::mem::take(&mut state.noise);
-        for (deviation, &threshold) in noise.iter_mut().zip(thresholds) {
-            *deviation = (threshold.abs() / SIGMAS).clamp(1e-150, 1e100);
+        let scales = thresholds.iter().zip(&self.noise_per_threshold);
+        for (deviation, (&threshold, &share)) in noise.iter_mut().zip(scales) {
+            *deviation = (threshold.abs() * share).clamp(1e-150, 1e100);
         }
         let mut valid = 0;
         for (q, &value) in y.iter().enumerate().take(Sensors::BITS as usize) {
@@ -226,7 +226,7 @@ impl Bank {
         let h = &state.slots[head];
         let calm = alone
             && h.accused() == 0
-            && !h.moving
+            && !h.loose
             && state.seen[head].square < QUIET + 2.0 * p as f64
             && state.seen[head].sound
             && state.evidence.iter().all(|&e| e < FREEZING)
@@ -251,7 +251,8 @@ impl Bank {
     /// Another mode: what the model misses, and what a load does, may differ.
     fn enter(&self, state: &mut BankState, mode: usize) {
         let Layout { n, m, .. } = self.layout;
-        let (size, load) = (self.layout.size(), self.layout.load());
+        let size = self.layout.size();
+        let load = self.layout.load() + self.layout.state_load();
         let model = &self.modes[mode];
         let error = self.settings.model_error * self.settings.model_error;
         for slot in state.live.slots() {
@@ -368,7 +369,7 @@ impl Bank {
             };
         }
         state.misfit += RENEWED * (state.seen[state.best].square.min(1e3) - state.misfit);
-        state.model_valid = state.misfit < 4.0 * p as f64 && !h.moving;
+        state.model_valid = state.misfit < 4.0 * p as f64 && !h.loose;
         self.find_load(state, model);
         state.actuator_fault = 0;
         for (j, (load, size)) in state.load.iter().zip(&self.settings.input_load).enumerate() {
@@ -379,11 +380,18 @@ impl Bank {
     /// Load and gain error of the leading hypothesis as an input.
     fn find_load(&self, state: &mut BankState, model: &ModeModel) {
         let Layout { n, m, .. } = self.layout;
-        let (load, gain) = (self.layout.load(), self.layout.gain());
+        let (load, gain, loads) = (self.layout.load(), self.layout.gain(), self.layout.loads());
         let z = &state.slots[state.best].z;
         for j in 0..m {
-            state.load[j] = dot(&model.b_inverse[j * n..(j + 1) * n], &z[load..load + n])
-                + state.u[j] * z[gain + j];
+            state.load[j] = z[load + j] + state.u[j] * z[gain + j];
+            for i in 0..n {
+                let others = m..loads;
+                let effect = dot(
+                    &model.g[i * loads + m..(i + 1) * loads],
+                    &z[load..gain][others],
+                );
+                state.load[j] += model.b_inverse[j * n + i] * effect;
+            }
         }
     }
 
@@ -428,9 +436,7 @@ impl Bank {
             let mut sum = model.state_offset[i]
                 + dot(&model.a[i * n..(i + 1) * n], &state.own)
                 + dot(&model.e[i * d..(i + 1) * d], &z[n..n + d]);
-            for j in 0..m {
-                sum += model.b[i * m + j] * u[j] * (1.0 + z[self.layout.gain() + j]);
-            }
+            sum += dot(&model.b[i * m..(i + 1) * m], u);
             state.scratch[i] = crate::kernel::bounded(sum);
         }
         state.own.copy_from_slice(&state.scratch[..n]);
@@ -454,6 +460,11 @@ impl BankState {
     /// Whether every index in it is one; a state that came as bytes may hold any.
     pub fn sound(&self) -> bool {
         self.live.sound() && self.live.contains(self.best)
+    }
+
+    /// The hypotheses in competition.
+    pub fn hypotheses(&self) -> impl Iterator<Item = &Hypothesis> {
+        self.live.slots().filter_map(|slot| self.slots.get(slot))
     }
 
     /// The leading hypothesis.

@@ -3,6 +3,7 @@
 use super::linear::{multiply, multiply_transposed};
 use alloc::vec;
 use alloc::vec::Vec;
+use core::ops::Range;
 
 /// Sizes of the parts of the joint state `[x; d; l; g; f]`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -15,16 +16,37 @@ pub struct Layout {
     pub p: usize,
     /// States `d` of the periodic disturbance.
     pub d: usize,
+    /// Channels of the disturbance, each with a load.
+    pub s: usize,
+}
+
+/// A jump of loads from one source, or of all at once.
+#[derive(Clone, Debug)]
+pub struct Jump {
+    /// Which loads jump.
+    pub loads: Range<usize>,
+    /// Covariance of their effect on the outputs (p x p).
+    pub seen: Vec<f64>,
+    /// Inputs whose gain jumps with it.
+    pub gains: Range<usize>,
 }
 
 impl Layout {
+    /// Entries of `l`: on each input, each channel of the disturbance, each state.
+    pub const fn loads(self) -> usize {
+        self.m + self.s + self.n
+    }
+    /// The load on state 0 among the loads.
+    pub const fn state_load(self) -> usize {
+        self.m + self.s
+    }
     /// First entry of `l`.
     pub const fn load(self) -> usize {
         self.n + self.d
     }
     /// First entry of `g`.
     pub const fn gain(self) -> usize {
-        self.load() + self.n
+        self.load() + self.loads()
     }
     /// First entry of `f`.
     pub const fn fault(self) -> usize {
@@ -36,7 +58,7 @@ impl Layout {
     }
 }
 
-/// One mode, row after row: `x+ = A x + B u + a + E_d d + l + B diag(u) g`, `y = C x + c + F_d d`.
+/// One mode, row after row: `x+ = A x + B u + a + E_d d + G l + B diag(u) g`, `y = C x + c + F_d d`.
 #[derive(Clone, Debug)]
 pub struct ModeModel {
     /// `A` (n x n).
@@ -57,10 +79,14 @@ pub struct ModeModel {
     pub state_offset: Vec<f64>,
     /// `y0 - C x0` (p).
     pub output_offset: Vec<f64>,
-    /// Covariance of the jump of a load (n x n).
-    pub load: Vec<f64>,
-    /// `C load C'` (p x p).
-    pub load_seen: Vec<f64>,
+    /// What the loads do to the states: `[B E I]` (n x loads).
+    pub g: Vec<f64>,
+    /// Standard deviation of a jump of each load.
+    pub load_size: Vec<f64>,
+    /// How far each load wanders per sample.
+    pub load_walk: Vec<f64>,
+    /// What jumps of loads may do: all of them at once first, then each source on its own.
+    pub jumps: Vec<Jump>,
     /// `C B` (p x m).
     pub cb: Vec<f64>,
     /// Square of what the states at their nominal values add to each output (p).
@@ -80,7 +106,7 @@ impl ModeModel {
         e: Vec<f64>,
         f: Vec<f64>,
         point: (&[f64], &[f64], &[f64]),
-        load: Vec<f64>,
+        (g, load_size, load_walk): (Vec<f64>, Vec<f64>, Vec<f64>),
         bias: Vec<f64>,
         b_inverse: Vec<f64>,
     ) -> Self {
@@ -101,10 +127,32 @@ impl ModeModel {
                 *value -= c[i * n + j] * x0[j];
             }
         }
-        let mut half = vec![0.0; p * n];
-        multiply(&mut half, &c, &load, n);
-        let mut load_seen = vec![0.0; p * p];
-        multiply_transposed(&mut load_seen, &half, &c, n);
+        let count = layout.loads();
+        let jump = |(loads, gains): (Range<usize>, Range<usize>)| {
+            let mut effect = vec![0.0; p * loads.len()];
+            for (row, c) in effect
+                .chunks_exact_mut(loads.len().max(1))
+                .zip(c.chunks_exact(n))
+            {
+                for (value, k) in row.iter_mut().zip(loads.clone()) {
+                    let column = g.iter().skip(k).step_by(count);
+                    *value = load_size[k] * c.iter().zip(column).map(|(c, g)| c * g).sum::<f64>();
+                }
+            }
+            let mut seen = vec![0.0; p * p];
+            multiply_transposed(&mut seen, &effect, &effect, loads.len());
+            Jump { loads, gains, seen }
+        };
+        let each = (0..m).map(|j| (j..j + 1, j..j + 1));
+        let waves = (m..layout.state_load()).map(|j| (j..j + 1, 0..0));
+        let states = core::iter::once((layout.state_load()..count, 0..0));
+        let every = core::iter::once((0..count, 0..m));
+        let jumps = every
+            .chain(each)
+            .chain(waves)
+            .chain(states)
+            .map(jump)
+            .collect();
         let mut cb = vec![0.0; p * m];
         multiply(&mut cb, &c, &b, n);
         Self {
@@ -117,8 +165,10 @@ impl ModeModel {
             u0: u0.to_vec(),
             state_offset,
             output_offset,
-            load,
-            load_seen,
+            g,
+            load_size,
+            load_walk,
+            jumps,
             cb,
             bias,
             b_inverse,

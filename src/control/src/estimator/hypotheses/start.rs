@@ -1,6 +1,6 @@
 //! From the plant and the settings to an estimator ready to run.
 
-use super::competition::Candidates;
+use super::competition::{Candidates, UNLIKE};
 use super::hypothesis::{Hypothesis, Innovation};
 use super::linear::{axpy, factor, solve};
 use super::model::{Layout, ModeModel};
@@ -71,29 +71,33 @@ fn left_inverse(b: &[f64], n: usize, m: usize) -> Vec<f64> {
     out
 }
 
-/// Covariance of a load's jump (n x n): through the inputs, the disturbance, and on the states.
-fn load(layout: Layout, mode: &Described, channels: &Channels, settings: &Hypotheses) -> Vec<f64> {
-    let n = layout.n;
-    let mut load = vec![0.0; n * n];
-    let sources = [
-        (&mode.b, &settings.input_load),
-        (&channels.e, &settings.disturbance_load),
-    ];
-    for (matrix, sizes) in sources {
-        for (column, size) in matrix.as_slice().chunks_exact(n).zip(sizes) {
-            for (row, &left) in load.chunks_exact_mut(n).zip(column) {
-                axpy(row, left * size * size, column);
-            }
-        }
-    }
+/// What loads do to the states (n x loads), how large they are, and how far they wander: on each input, each channel of the
+/// disturbance, each state.
+fn loads(
+    layout: Layout,
+    mode: &Described,
+    channels: &Channels,
+    settings: &Hypotheses,
+) -> (Vec<f64>, Vec<f64>, Vec<f64>) {
+    let Layout { n, m, s, .. } = layout;
+    let effect = Matrix::from_fn(n, layout.loads(), |i, k| match k {
+        k if k < m => mode.b.get(i, k).unwrap_or(0.0),
+        k if k < m + s => channels.e.get(i, k - m).unwrap_or(0.0),
+        k => f64::from(k - m - s == i),
+    });
+    let mut sizes = settings.input_load.clone();
+    sizes.extend(&settings.disturbance_load);
     for i in 0..n {
-        for j in 0..n {
+        let mut sum = 0.0;
+        for (j, size) in settings.state_load.iter().enumerate() {
             let still = f64::from(i == j) - mode.a.get(i, j).unwrap_or(0.0);
-            let moved = still * settings.state_load[j];
-            load[i * n + i] += moved * moved;
+            sum += (still * size) * (still * size);
         }
+        sizes.push(libm::sqrt(sum));
     }
-    load
+    let mut walks: Vec<f64> = sizes.iter().map(|size| settings.load_walk * size).collect();
+    walks[m..m + s].copy_from_slice(&settings.disturbance_walk);
+    (rows(&effect), sizes, walks)
 }
 
 fn model(
@@ -119,21 +123,28 @@ fn model(
         waves(&channels.e, harmonics),
         waves(&channels.f, harmonics),
         (&mode.x0, &mode.u0, &mode.y0),
-        load(layout, mode, channels, settings),
+        loads(layout, mode, channels, settings),
         bias,
         inverse,
     )
 }
 
 impl Bank {
-    /// The estimator of a plant with these `modes`; the sizes in `settings` must agree with it.
-    pub fn new(modes: &[Described], settings: &Hypotheses) -> Self {
+    /// The estimator of a plant with these `modes` and decision `thresholds` (p); the sizes in `settings`
+    /// must agree with it.
+    pub fn new(modes: &[Described], settings: &Hypotheses, thresholds: &[f64]) -> Self {
         let (n, m, p) = modes.first().map_or((0, 0, 0), |mode| {
             (mode.a.nrows(), mode.b.ncols(), mode.c.nrows())
         });
         let disturbances = settings.disturbance_load.len();
         let d = 2 * settings.angles.len() * disturbances;
-        let layout = Layout { n, m, p, d };
+        let layout = Layout {
+            n,
+            m,
+            p,
+            d,
+            s: disturbances,
+        };
         let described = modes.iter().zip(&settings.channels);
         let ln = libm::log;
         let turn = |_| {
@@ -154,9 +165,14 @@ impl Bank {
                 release: ln(settings.release_rate),
                 change: ln(settings.change_rate),
                 load: ln(settings.load_rate),
-                moving: ln(settings.load_moving),
-                settle: ln(1.0 - settings.load_moving),
+                changed: UNLIKE * ln(settings.load_rate),
             },
+            noise_per_threshold: settings
+                .noise
+                .iter()
+                .zip(thresholds)
+                .map(|(noise, threshold)| noise / threshold.abs().max(f64::MIN_POSITIVE))
+                .collect(),
             settings: settings.clone(),
         }
     }
@@ -170,7 +186,7 @@ impl Bank {
     /// At rest at the operating point of `mode`.
     pub fn start(&self, mode: usize) -> BankState {
         let layout = self.layout;
-        let Layout { n, m, p, d } = layout;
+        let Layout { n, m, p, d, .. } = layout;
         let size = layout.size();
         let settings = &self.settings;
         let model = &self.modes[mode];
@@ -180,10 +196,9 @@ impl Bank {
         let mut set = |k: usize, deviation: f64| first.cov[k * size + k] = deviation * deviation;
         for i in 0..n {
             set(i, settings.start[i]);
-            set(
-                layout.load() + i,
-                AT_REST * libm::sqrt(model.load[i * n + i]),
-            );
+        }
+        for (k, size) in model.load_size.iter().enumerate() {
+            set(layout.load() + k, AT_REST * size);
         }
         for i in 0..d {
             set(n + i, settings.disturbance_size[i]);
@@ -197,7 +212,7 @@ impl Bank {
             slots,
             seen: vec![Innovation::new(layout); SLOTS],
             live: Live::ONE,
-            candidates: Candidates::new(p),
+            candidates: Candidates::new(p, model.jumps.len()),
             scratch: vec![0.0; n.max(1) * size],
             trial: Innovation::new(layout),
             mode: None,
