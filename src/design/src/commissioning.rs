@@ -43,7 +43,7 @@ pub enum CommissioningError {
     /// A mode is unstable.
     #[error(
         "mode {mode}: A has spectral radius {radius:.4}, but the estimator needs a stable mode (below 1): \
-         stabilise the plant first or set estimator.method = \"none\""
+         set estimator.method = \"observer\""
     )]
     Unstable {
         /// The mode, from 1.
@@ -54,7 +54,7 @@ pub enum CommissioningError {
     /// A mode's response lasts longer than [`LONGEST_RESPONSE`].
     #[error(
         "mode {mode}: the response is still felt after {LONGEST_RESPONSE} samples (spectral radius {radius:.6}): \
-         choose a longer sample_time for this loop"
+         set estimator.method = \"observer\", or choose a longer sample_time for this loop"
     )]
     SlowResponse {
         /// The mode, from 1.
