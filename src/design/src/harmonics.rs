@@ -23,7 +23,7 @@ pub struct KnownDisturbance {
 }
 
 impl KnownDisturbance {
-    /// Angle per sample (radians) of each harmonic, for [`ControlSpec::resonators`].
+    /// Angle per sample (radians) of each harmonic, for [`ControlSpec::resonators`](crate::ControlSpec::resonators).
     pub fn angles(&self, sample_time: f64) -> Vec<f64> {
         let fundamental = core::f64::consts::TAU * sample_time / self.period;
         (1..=self.harmonics)
