@@ -81,7 +81,10 @@ fn continuous_matrices_given_as_discrete_are_noticed() {
     let fast = CONTINUOUS
         .replace("continuous = true\n", "")
         .replace("-0.5, 0.0", "-5.0, 0.0");
-    let (code, _, error) = design(&fast);
+    let (code, out, error) = design(&fast);
+    assert_eq!(code, 0, "{error}");
+    assert!(out.contains("set continuous = true"), "{out}");
+    let (code, _, error) = design(&(fast + "[estimator]\nmethod = \"reference\"\n"));
     assert_eq!(code, 2, "{error}");
     assert!(error.contains("set continuous = true"), "{error}");
     let (code, _, error) = design(&CONTINUOUS.replace("-0.5, 0.0", "900.0, 0.0"));
