@@ -29,7 +29,7 @@ HEADER = commands.ROOT / "tests" / "c" / "fmi2_host.h"
 def _standard() -> set[str]:
     """Returns the functions of the standard, as the C host declares them."""
     table = HEADER.read_text()
-    table = table[table.index("#define FMI2_CALLED") : table.index("typedef struct {\n    void *library")]
+    table = table[table.index("#define FMI2_LOOP(X)") : table.index("typedef struct {\n    void *library")]
     return {f"fmi2{name}" for name in re.findall(r"\bX\((\w+)", table)}
 
 

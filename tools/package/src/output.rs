@@ -1,7 +1,7 @@
 //! An output directory that gets all of its files or none, also when the program is killed.
 //!
 //! Files are collected in a hidden directory of the output directory and flushed to the disk. It
-//! is renamed to [`READY`] once it is complete: from then on the new files count, and are moved into
+//! is renamed to `.ftc-fmu-ready` once it is complete: from then on the new files count, and are moved into
 //! place one by one. Who is killed before that has changed nothing; who is killed after it leaves
 //! whole files, old ones and new ones, and the next run into that directory moves the rest before
 //! it does anything else. A hidden directory is locked by the run that writes it, so that runs that
