@@ -9,7 +9,7 @@ fn main() -> ExitCode {
         );
         return ExitCode::from(2);
     }
-    ExitCode::from(ftc_fmu::main(std::env::args_os().collect(), None))
+    ExitCode::from(ftc_fmu::main(std::env::args_os().collect(), None, None))
 }
 
 /// Whether standard output was closed (`>&-`) when the program started. Rust opens /dev/null in its

@@ -225,7 +225,12 @@ enum Experiment {
 /// Runs the program with its arguments (the first is its name) and returns its exit code.
 ///
 /// FMU binaries are sought in `binaries`, by default beside the running program.
-pub fn main(arguments: Vec<OsString>, binaries: Option<PathBuf>) -> u8 {
+/// `itself` is the command that starts this program once more, by default the running one.
+pub fn main(
+    arguments: Vec<OsString>,
+    binaries: Option<PathBuf>,
+    itself: Option<Vec<OsString>>,
+) -> u8 {
     let arguments = match Arguments::try_parse_from(arguments) {
         Ok(arguments) => arguments,
         Err(error) => {
@@ -237,7 +242,7 @@ pub fn main(arguments: Vec<OsString>, binaries: Option<PathBuf>) -> u8 {
             };
         }
     };
-    match run(&arguments, binaries) {
+    match run(&arguments, binaries, itself) {
         Ok(_) if arguments.quiet => DONE,
         Ok(text) => print(&text).map_or_else(unprinted, |()| DONE),
         Err(failure) => {
@@ -249,7 +254,11 @@ pub fn main(arguments: Vec<OsString>, binaries: Option<PathBuf>) -> u8 {
 }
 
 /// Runs the command and returns what to print.
-fn run(arguments: &Arguments, binaries: Option<PathBuf>) -> Result<String, Failure> {
+fn run(
+    arguments: &Arguments,
+    binaries: Option<PathBuf>,
+    itself: Option<Vec<OsString>>,
+) -> Result<String, Failure> {
     let progress = Progress::new(arguments.quiet);
     let asked = |solved, save| How {
         solver: arguments.solver.into(),
@@ -283,7 +292,11 @@ fn run(arguments: &Arguments, binaries: Option<PathBuf>) -> Result<String, Failu
             json,
             key,
             no_run,
-        } => verify(fmu, *json, key.as_deref(), *no_run),
+        } => {
+            let running = || std::env::current_exe().ok().map(|path| vec![path.into()]);
+            let this = itself.or_else(running).filter(|_| !no_run);
+            verify(fmu, *json, key.as_deref(), this)
+        }
         Command::RunBinary { fmu } => {
             let ran = package::binary::compare(fmu)?;
             Ok(serde_json::to_string(&ran).unwrap_or_default() + "\n")
@@ -332,14 +345,20 @@ fn run(arguments: &Arguments, binaries: Option<PathBuf>) -> Result<String, Failu
 }
 
 /// Proves again what an FMU promises.
-fn verify(fmu: &Path, as_json: bool, key: Option<&Path>, no_run: bool) -> Result<String, Failure> {
-    let this = std::env::current_exe().ok().filter(|_| !no_run);
+fn verify(
+    fmu: &Path,
+    as_json: bool,
+    key: Option<&Path>,
+    this: Option<Vec<OsString>>,
+) -> Result<String, Failure> {
     let checks = package::Checks {
         key: key
             .map(package::signature::VerifyingKey::read)
             .transpose()?,
-        runner: this
-            .map(|program| package::binary::Runner(vec![program.into(), "run-binary".into()])),
+        runner: this.map(|mut command| {
+            command.push("run-binary".into());
+            package::binary::Runner(command)
+        }),
     };
     match package::verify_with(fmu, &checks) {
         Ok(verification) if as_json => Ok(summary::pretty(&verification.json())),

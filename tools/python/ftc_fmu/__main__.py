@@ -13,7 +13,7 @@ def main() -> int:
     """Runs the program with this process's arguments and returns its exit code."""
     # The program ends at once where Python would wait for the interpreter's turn.
     signal.signal(signal.SIGINT, signal.SIG_DFL)
-    return _core.main(["ftc-fmu", *sys.argv[1:]], HOME)
+    return _core.main(["ftc-fmu", *sys.argv[1:]], HOME, [sys.executable, "-m", "ftc_fmu"])
 
 
 if __name__ == "__main__":

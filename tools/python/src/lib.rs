@@ -34,8 +34,8 @@ mod _core {
 
 /// The command line; returns its exit code.
 #[pyfunction]
-fn main(py: Python<'_>, arguments: Vec<OsString>, binaries: PathBuf) -> u8 {
-    py.detach(|| ftc_fmu::main(arguments, Some(binaries)))
+fn main(py: Python<'_>, arguments: Vec<OsString>, binaries: PathBuf, itself: Vec<OsString>) -> u8 {
+    py.detach(|| ftc_fmu::main(arguments, Some(binaries), Some(itself)))
 }
 
 /// Proves an FMU again; returns the proof as JSON. `runner` is the command that runs its binary.
