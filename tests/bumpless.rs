@@ -6,10 +6,9 @@
 
 use ftc_control::parameters::{Compensation, EstimatorMethod};
 use ftc_control::{Compensate, Controller};
-use ftc_design::assembly::{DatabaseSource, EstimatorSpec, Request, Threshold, assemble};
+use ftc_design::assembly::{DatabaseSource, EstimatorSpec, Request, assemble};
 use ftc_design::{
-    ControlSpec, Design, HypothesesSpec, Lyapunov, Objective, ObserverChoice, ObserverSpec, Signal,
-    Signals,
+    ControlSpec, Design, Lyapunov, Objective, ObserverChoice, ObserverSpec, Signal, Signals,
 };
 use ftc_plant::scenario::{ModeInterval, Waveform};
 use ftc_plant::{Mode, OperatingPoint, Scenario, SwitchedPlant, TruePlant};
@@ -77,14 +76,8 @@ fn request(lyapunov: Lyapunov, bumpless: bool) -> Request {
         },
         estimator: EstimatorSpec {
             method: EstimatorMethod::None,
-            response_length: None,
             database: DatabaseSource::Model,
-            threshold: Threshold::Sigmas(6.0),
-            debounce: 1,
-            stuck_after: 0,
-            adapt: false,
-            disturbance: None,
-            hypotheses: HypothesesSpec::default(),
+            ..EstimatorSpec::default()
         },
         compensation: Compensation::None,
         scenario: Scenario {

@@ -6,12 +6,10 @@ use common::{Channel, plant, reference, scenario};
 use core::f64::consts::TAU;
 use ftc_control::Controller;
 use ftc_control::parameters::{Compensation, EstimatorMethod};
-use ftc_design::assembly::{
-    DatabaseSource, EstimatorSpec, KnownDisturbance, Request, Threshold, assemble,
-};
+use ftc_design::assembly::{EstimatorSpec, KnownDisturbance, Request, assemble};
 use ftc_design::{
-    ControlSpec, Design, DesignError, HypothesesSpec, Lyapunov, ObserverChoice, ObserverSpec,
-    Signal, Signals, check_controllable, state_feedback,
+    ControlSpec, Design, DesignError, Lyapunov, ObserverChoice, ObserverSpec, Signal, Signals,
+    check_controllable, state_feedback,
 };
 use ftc_plant::scaling::Scaling;
 use ftc_plant::scenario::{ModeInterval, Waveform};
@@ -74,14 +72,8 @@ fn design(channel: Channel, control: ControlSpec) -> Design {
         },
         estimator: EstimatorSpec {
             method: EstimatorMethod::Reference,
-            response_length: None,
-            database: DatabaseSource::Commission,
-            threshold: Threshold::Sigmas(6.0),
-            debounce: 1,
-            stuck_after: 0,
-            adapt: false,
-            hypotheses: HypothesesSpec::default(),
             disturbance: Some(disturbance(1)),
+            ..EstimatorSpec::default()
         },
         compensation: Compensation::VirtualSensor,
         true_plant: ftc_plant::TruePlant::AsDesigned,

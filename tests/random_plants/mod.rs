@@ -2,12 +2,8 @@
 #![allow(dead_code, missing_docs)]
 
 use ftc_control::parameters::{Compensation, EstimatorMethod};
-use ftc_design::assembly::{
-    DatabaseSource, EstimatorSpec, KnownDisturbance, Request, Threshold, assemble,
-};
-use ftc_design::{
-    ControlSpec, Design, HypothesesSpec, Lyapunov, ObserverChoice, ObserverSpec, Signal, Signals,
-};
+use ftc_design::assembly::{EstimatorSpec, KnownDisturbance, Request, assemble};
+use ftc_design::{ControlSpec, Design, Lyapunov, ObserverChoice, ObserverSpec, Signal, Signals};
 use ftc_plant::Scenario;
 use ftc_plant::scenario::{ModeInterval, Waveform};
 use ftc_plant::{Mode, OperatingPoint, SwitchedPlant, spectral_radius};
@@ -133,18 +129,12 @@ pub fn design_with(dice: &mut Dice, method: EstimatorMethod) -> Design {
             },
             estimator: EstimatorSpec {
                 method,
-                response_length: None,
-                database: DatabaseSource::Commission,
-                threshold: Threshold::Sigmas(6.0),
-                debounce: 1,
-                stuck_after: 0,
-                adapt: false,
-                hypotheses: HypothesesSpec::default(),
                 disturbance: Some(KnownDisturbance {
                     period,
                     harmonics: 1,
                     amplitude: Some(vec![0.05]),
                 }),
+                ..EstimatorSpec::default()
             },
             compensation: Compensation::VirtualSensor,
             true_plant: ftc_plant::TruePlant::AsDesigned,

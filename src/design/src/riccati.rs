@@ -16,16 +16,38 @@ const CONVERGED: f64 = 1e-14;
 /// storage function of the bounded-real lemma.
 pub(crate) fn solve(a: &DMatrix<f64>, g: &DMatrix<f64>, h: &DMatrix<f64>) -> Option<DMatrix<f64>> {
     let identity = DMatrix::<f64>::identity(a.nrows(), a.nrows());
-    let (mut a, mut g, mut h) = (a.clone(), g.clone(), h.clone());
-    for _ in 0..DOUBLINGS {
-        let factor = (&identity + &g * &h).lu();
+    let (mut a, mut g) = (a.clone(), g.clone());
+    doubling(h, |h| {
+        let factor = (&identity + &g * h).lu();
         let inner = factor.solve(&a)?;
-        let growth = a.transpose() * &h * &inner;
+        let growth = a.transpose() * h * &inner;
         let reach = &a * factor.solve(&g)? * a.transpose();
         a = &a * inner;
-        g = symmetric(g + reach);
+        g = symmetric(&g + reach);
+        is_finite(&a).then_some(growth)
+    })
+}
+
+/// `X = a' X a + h` for a stable `a`: the sum of `a'^k h a^k`; `None` where it does not converge.
+pub(crate) fn lyapunov(a: &DMatrix<f64>, h: &DMatrix<f64>) -> Option<DMatrix<f64>> {
+    let mut a = a.clone();
+    doubling(h, |h| {
+        let growth = a.transpose() * (h * &a);
+        a = &a * &a;
+        is_finite(&a).then_some(growth)
+    })
+}
+
+/// Adds to `h` what each doubling contributes, until that is nothing; `None` where it does not end.
+fn doubling(
+    h: &DMatrix<f64>,
+    mut growth: impl FnMut(&DMatrix<f64>) -> Option<DMatrix<f64>>,
+) -> Option<DMatrix<f64>> {
+    let mut h = h.clone();
+    for _ in 0..DOUBLINGS {
+        let growth = growth(&h)?;
         h = symmetric(h + &growth);
-        if !h.iter().chain(a.iter()).all(|value| value.is_finite()) {
+        if !is_finite(&h) {
             return None;
         }
         if growth.amax() <= CONVERGED * h.amax() {
@@ -35,21 +57,8 @@ pub(crate) fn solve(a: &DMatrix<f64>, g: &DMatrix<f64>, h: &DMatrix<f64>) -> Opt
     None
 }
 
-/// `X = a' X a + h` for a stable `a`: the sum of `a'^k h a^k`; `None` where it does not converge.
-pub(crate) fn lyapunov(a: &DMatrix<f64>, h: &DMatrix<f64>) -> Option<DMatrix<f64>> {
-    let (mut a, mut h) = (a.clone(), h.clone());
-    for _ in 0..DOUBLINGS {
-        let growth = a.transpose() * (&h * &a);
-        a = &a * &a;
-        h = symmetric(h + &growth);
-        if !h.iter().chain(a.iter()).all(|value| value.is_finite()) {
-            return None;
-        }
-        if growth.amax() <= CONVERGED * h.amax() {
-            return Some(h);
-        }
-    }
-    None
+fn is_finite(x: &DMatrix<f64>) -> bool {
+    x.iter().all(|value| value.is_finite())
 }
 
 /// `(x + x') / 2`.

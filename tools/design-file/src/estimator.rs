@@ -8,7 +8,6 @@ use crate::values::{NameOrList, NumberOrList};
 use ftc_control::parameters;
 use ftc_design::HypothesesSpec;
 use ftc_design::assembly::{DatabaseSource, EstimatorSpec, KnownDisturbance, Threshold};
-use ftc_design::commissioning::response_length;
 use ftc_plant::Dimensions;
 
 /// The longest debounce in samples, and the most repetitions of a reading.
@@ -23,15 +22,11 @@ pub(crate) fn estimator(
     dims: Dimensions,
     logs: &Logs,
 ) -> Result<EstimatorSpec, String> {
-    let usual = EstimatorSpec::default();
+    let usual = EstimatorSpec::suited(&logs.plant.modes);
     let database = database(given, logs)?.unwrap_or(usual.database);
     let method = match (given.method, &database) {
         // Only this method reads a log.
         (None, DatabaseSource::Recorded(_)) => parameters::EstimatorMethod::Reference,
-        // An integrator, a slow or an unstable mode has no response that ends.
-        (None, _) if response_length(&logs.plant.modes).is_err() => {
-            parameters::EstimatorMethod::Observer
-        }
         (None, _) => usual.method,
         (Some(EstimatorMethod::Observer), _) => parameters::EstimatorMethod::Observer,
         (Some(EstimatorMethod::Reference), _) => parameters::EstimatorMethod::Reference,
