@@ -5,7 +5,9 @@ set -euo pipefail
 cd "$(dirname "$0")/../.."
 
 flags=("$@" "--remap-path-prefix=$PWD/=")
-for index in "${CARGO_HOME:-$HOME/.cargo}"/registry/src/*/; do
+# Without the folders, named "-...", that cargo package leaves there: other flags build everything anew,
+# and what was built last is what is exported.
+for index in "${CARGO_HOME:-$HOME/.cargo}"/registry/src/[!-]*/; do
     flags+=("--remap-path-prefix=$index=")
 done
 # The standard library's sources, where they are installed or built along.
