@@ -183,7 +183,7 @@ impl Bank {
             });
         }
         let displaced = self.displaced(state, slot, model, reading) & reading.valid;
-        if accused == 0 && displaced != 0 && !state.first {
+        if (accused | displaced) != 0 && !state.first {
             if unlikely {
                 let value = score
                     + self.prices.fault
@@ -195,7 +195,7 @@ impl Bank {
                     convinced,
                 });
             }
-            if self.settings.trusts_model() {
+            if accused == 0 && self.settings.trusts_model() {
                 let value = self.trial(state, slot, model, reading, Action::Drift(displaced));
                 let square = state.trial.square;
                 if square < QUIET + 2.0 * p as f64 {

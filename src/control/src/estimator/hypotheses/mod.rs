@@ -39,6 +39,15 @@ const FREEZING: f64 = 4.0;
 const DISPLACED: f64 = 36.0;
 /// Memory of the running misfit: its share that a sample renews.
 const RENEWED: f64 = 0.1;
+/// Variance of a sensor's noise at the start, relative to the design's, and how many samples say so.
+const NOISE_AT_START: f64 = 4.0;
+const NOISE_PRIOR: f64 = 25.0;
+/// Samples over which the noise is estimated afterwards.
+const NOISE_MEMORY: f64 = 300.0;
+/// Largest variance of the noise relative to the design's.
+const MOST_NOISE: f64 = 100.0;
+/// Squared innovation, relative to its variance, beyond which it says nothing more about the noise.
+const OUTLIER: f64 = 9.0;
 
 /// The estimator: immutable, shared by any number of [`BankState`]s.
 #[derive(Clone, Debug)]
@@ -132,6 +141,9 @@ pub struct BankState {
     first: bool,
     /// Noise deviation of each sensor (p).
     noise: Vec<f64>,
+    /// Its variance relative to the design's (p), and how many samples it rests on.
+    noise_ratio: Vec<f64>,
+    noise_samples: f64,
     /// Evidence that a sensor repeats one value, that value's mean, and of how many samples (p each).
     evidence: Vec<f64>,
     mean: Vec<f64>,
@@ -160,7 +172,7 @@ pub struct BankState {
 
 crate::state!(BankState {
     parts: [
-        slots, seen, candidates, scratch, trial, u, moved, noise, evidence, mean, count, own,
+        slots, seen, candidates, scratch, trial, u, moved, noise, noise_ratio, evidence, mean, count, own,
         own_output, expected, residual, load
     ],
     constants: [],
@@ -168,6 +180,7 @@ crate::state!(BankState {
         live,
         mode,
         first,
+        noise_samples,
         best,
         misfit,
         accused,
@@ -183,8 +196,10 @@ impl Bank {
     pub fn observe(&self, state: &mut BankState, mode: usize, y: &[f64], thresholds: &[f64]) {
         let mut noise = core::mem::take(&mut state.noise);
         let scales = thresholds.iter().zip(&self.noise_per_threshold);
-        for (deviation, (&threshold, &share)) in noise.iter_mut().zip(scales) {
-            *deviation = (threshold.abs() * share).clamp(1e-150, 1e100);
+        for ((deviation, (&threshold, &share)), &ratio) in
+            noise.iter_mut().zip(scales).zip(&state.noise_ratio)
+        {
+            *deviation = (threshold.abs() * share * libm::sqrt(ratio)).clamp(1e-150, 1e100);
         }
         let mut valid = 0;
         for (q, &value) in y.iter().enumerate().take(Sensors::BITS as usize) {
@@ -243,9 +258,37 @@ impl Bank {
             self.compete(state, model, reading);
         }
         state.first = false;
+        self.learn_noise(state, reading);
         let displaced = self.displaced(state, state.best, model, reading);
         state.suspect |= displaced & !state.slots[state.best].accused();
         self.conclude(state, model, reading);
+    }
+
+    /// Noise of the sensors that are believed, from the innovations of the leading hypothesis: the mean
+    /// of the noise's square given the reading. The design's noise is the least.
+    fn learn_noise(&self, state: &mut BankState, reading: Reading<'_>) {
+        let p = self.layout.p;
+        let (seen, accused) = (&state.seen[state.best], state.slots[state.best].accused());
+        if !seen.sound {
+            return;
+        }
+        state.noise_samples = (state.noise_samples + 1.0).min(NOISE_MEMORY);
+        for q in 0..p {
+            if !has(reading.valid & !accused, q) {
+                continue;
+            }
+            let factor = &seen.s[q * p..=q * p + q];
+            let variance = dot(factor, factor);
+            let noise = reading.noise[q] * reading.noise[q];
+            let share = noise / variance;
+            let square = (seen.r[q] * seen.r[q]).min(OUTLIER * variance);
+            let relative = share * (square / variance) + (1.0 - share);
+            if relative.is_finite() {
+                let ratio = &mut state.noise_ratio[q];
+                *ratio += *ratio * (relative - 1.0) / state.noise_samples;
+                *ratio = ratio.clamp(1.0, MOST_NOISE);
+            }
+        }
     }
 
     /// Another mode: what the model misses, and what a load does, may differ.

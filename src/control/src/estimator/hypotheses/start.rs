@@ -4,7 +4,7 @@ use super::competition::{Candidates, UNLIKE};
 use super::hypothesis::{Hypothesis, Innovation};
 use super::linear::{axpy, factor, solve};
 use super::model::{Layout, ModeModel};
-use super::{Bank, BankState, Live, Prices, SLOTS};
+use super::{Bank, BankState, Live, NOISE_AT_START, NOISE_PRIOR, Prices, SLOTS};
 use crate::matrix::Matrix;
 use crate::parameters::{Channels, Hypotheses, ModeModel as Described};
 use alloc::vec;
@@ -220,6 +220,8 @@ impl Bank {
             moved: vec![0.0; m],
             first: true,
             noise: vec![0.0; p],
+            noise_ratio: vec![NOISE_AT_START; p],
+            noise_samples: NOISE_PRIOR,
             evidence: vec![0.0; p],
             mean: vec![0.0; p],
             count: vec![0.0; p],
