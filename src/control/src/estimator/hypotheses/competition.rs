@@ -3,7 +3,7 @@
 use super::hypothesis::{Hypothesis, Kinds, Reading, Sensors, has};
 use super::linear::dot;
 use super::model::{Layout, ModeModel};
-use super::{Bank, BankState, FREEZING, KEEP, Live, RENEWED};
+use super::{APART, Bank, BankState, DISPLACED, FREEZING, KEEP, Live, RENEWED};
 use alloc::vec;
 use alloc::vec::Vec;
 use serde::{Deserialize, Serialize};
@@ -182,20 +182,20 @@ impl Bank {
                 convinced,
             });
         }
-        let displaced = self.displaced(state, slot, model, reading) & reading.valid;
-        if (accused | displaced) != 0 && !state.first {
-            if unlikely {
-                let value = score
-                    + self.prices.fault
-                    + self.trial(state, slot, model, reading, Action::Home);
-                state.candidates.add(Candidate {
-                    score: value,
-                    parent: slot,
-                    action: Action::Home,
-                    convinced,
-                });
-            }
-            if accused == 0 && self.settings.trusts_model() {
+        if unlikely && !state.first && self.displaced(state, slot, model, reading, APART) != 0 {
+            let value = score
+                + self.prices.fault
+                + self.trial(state, slot, model, reading, Action::Home);
+            state.candidates.add(Candidate {
+                score: value,
+                parent: slot,
+                action: Action::Home,
+                convinced,
+            });
+        }
+        if accused == 0 && self.settings.trusts_model() && !state.first {
+            let displaced = self.displaced(state, slot, model, reading, DISPLACED) & reading.valid;
+            if displaced != 0 {
                 let value = self.trial(state, slot, model, reading, Action::Drift(displaced));
                 let square = state.trial.square;
                 if square < QUIET + 2.0 * p as f64 {

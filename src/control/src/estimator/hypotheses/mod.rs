@@ -35,8 +35,10 @@ const KEEP: usize = 12;
 const SLOTS: usize = 2 * KEEP;
 /// Evidence of a frozen sensor from which it is considered, in log likelihood.
 const FREEZING: f64 = 4.0;
-/// Noise deviations (squared) from which loads are said to have moved an output.
+/// Deviations (squared) of the model's own run from which loads are said to have moved an output.
 const DISPLACED: f64 = 36.0;
+/// The same, from which it is considered that they are gone.
+const APART: f64 = 4.0;
 /// Memory of the running misfit: its share that a sample renews.
 const RENEWED: f64 = 0.1;
 /// Variance of a sensor's noise at the start, relative to the design's, and how many samples say so.
@@ -259,7 +261,7 @@ impl Bank {
         }
         state.first = false;
         self.learn_noise(state, reading);
-        let displaced = self.displaced(state, state.best, model, reading);
+        let displaced = self.displaced(state, state.best, model, reading, DISPLACED);
         state.suspect |= displaced & !state.slots[state.best].accused();
         self.conclude(state, model, reading);
     }
@@ -365,13 +367,15 @@ impl Bank {
         }
     }
 
-    /// Sensors that loads have moved away from the model's own run.
+    /// Sensors that loads have moved away from the model's own run, by more than the root of `limit`
+    /// deviations.
     fn displaced(
         &self,
         state: &BankState,
         slot: usize,
         model: &ModeModel,
         reading: Reading<'_>,
+        limit: f64,
     ) -> Sensors {
         let Layout { n, p, d, .. } = self.layout;
         let z = &state.slots[slot].z;
@@ -386,7 +390,7 @@ impl Bank {
                 variance += c * c * self.own_variance(model, &state.own, k);
             }
             let off = output - state.own_output[q];
-            if off * off > DISPLACED * variance {
+            if off * off > limit * variance {
                 set |= 1 << q;
             }
         }
