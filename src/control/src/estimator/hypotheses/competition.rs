@@ -193,20 +193,8 @@ impl Bank {
                 convinced,
             });
         }
-        if accused == 0 && self.settings.trusts_model() && !state.first {
-            let displaced = self.displaced(state, slot, model, reading, DISPLACED) & reading.valid;
-            if displaced != 0 {
-                let value = self.trial(state, slot, model, reading, Action::Drift(displaced));
-                let square = state.trial.square;
-                if square < QUIET + 2.0 * p as f64 {
-                    state.candidates.add(Candidate {
-                        score: stay.max(score + value) + 1.0,
-                        parent: slot,
-                        action: Action::Drift(displaced),
-                        convinced: true,
-                    });
-                }
-            }
+        if accused == 0 && !state.first {
+            self.propose_drift(state, slot, model, reading, stay);
         }
         let free = all & !accused & reading.valid;
         let fault_price = if state.first {
@@ -312,6 +300,40 @@ impl Bank {
                 parent: slot,
                 action: Action::Release(accused),
                 convinced: true,
+            });
+        }
+    }
+
+    /// The sensors that have left the model's own run may have drifted, and no load acts. It is followed
+    /// beside the explanation by loads, so that the end of the drift is recognised; it decides only where
+    /// the model is trusted.
+    fn propose_drift(
+        &self,
+        state: &mut BankState,
+        slot: usize,
+        model: &ModeModel,
+        reading: Reading<'_>,
+        stay: f64,
+    ) {
+        let trusted = self.settings.trusts_model();
+        let limit = if trusted { DISPLACED } else { APART };
+        let set = self.displaced(state, slot, model, reading, limit) & reading.valid;
+        let known = |other: usize| state.slots[other].additive == set && !state.slots[other].convinced;
+        if set == 0 || !trusted && state.live.slots().any(known) {
+            return;
+        }
+        let value = self.trial(state, slot, model, reading, Action::Drift(set));
+        if state.trial.square < QUIET + 2.0 * self.layout.p as f64 {
+            let before = stay - state.seen[slot].likelihood(self.layout.p);
+            state.candidates.add(Candidate {
+                score: if trusted {
+                    stay.max(before + value) + 1.0
+                } else {
+                    stay
+                },
+                parent: slot,
+                action: Action::Drift(set),
+                convinced: trusted,
             });
         }
     }

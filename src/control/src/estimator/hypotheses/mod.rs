@@ -151,6 +151,8 @@ pub struct BankState {
     mean: Vec<f64>,
     count: Vec<f64>,
     best: usize,
+    /// Sensors that loads have moved away from the model's own run.
+    apart: Sensors,
     /// Running mean of the leading hypothesis's squared whitened innovation.
     misfit: f64,
     /// The model's own run under the input alone (n), and its outputs (p).
@@ -184,6 +186,7 @@ crate::state!(BankState {
         first,
         noise_samples,
         best,
+        apart,
         misfit,
         accused,
         suspect,
@@ -248,6 +251,7 @@ impl Bank {
             && state.seen[head].sound
             && state.evidence.iter().all(|&e| e < FREEZING)
             && !state.first
+            && state.apart == 0
             && !(self.settings.trusts_model() && state.suspect != 0);
         if calm {
             state.slots[head].update(layout, &mut state.seen[head], bias);
@@ -262,6 +266,7 @@ impl Bank {
         state.first = false;
         self.learn_noise(state, reading);
         let displaced = self.displaced(state, state.best, model, reading, DISPLACED);
+        state.apart = self.displaced(state, state.best, model, reading, APART);
         state.suspect |= displaced & !state.slots[state.best].accused();
         self.conclude(state, model, reading);
     }

@@ -226,6 +226,7 @@ impl Bank {
             mean: vec![0.0; p],
             count: vec![0.0; p],
             best: 0,
+            apart: 0,
             misfit: p as f64,
             own: model.x0.clone(),
             own_output: vec![0.0; p],
