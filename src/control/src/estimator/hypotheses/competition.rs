@@ -457,12 +457,7 @@ impl Bank {
                         if !has(reading.valid, q) || !has(reading.valid, j) {
                             continue;
                         }
-                        let mut sum = 0.0;
-                        for k in 0..n {
-                            sum += model.c[q * n + k]
-                                * model.c[j * n + k]
-                                * self.own_variance(model, &state.own, k);
-                        }
+                        let mut sum = state.own.covariance(model, &self.settings, q, j);
                         if q == j {
                             sum += reading.noise[q] * reading.noise[q];
                             if has(set, q) {
@@ -472,7 +467,7 @@ impl Bank {
                         trial.s[q * p + j] = sum;
                     }
                     trial.r[q] = if has(reading.valid, q) {
-                        reading.y[q] - state.own_output[q]
+                        reading.y[q] - state.own.y[q]
                     } else {
                         0.0
                     };
@@ -517,13 +512,6 @@ impl Bank {
             }
             error * sum
         })
-    }
-
-    /// Variance of entry `k` of the model's own run.
-    pub(super) fn own_variance(&self, model: &ModeModel, own: &[f64], k: usize) -> f64 {
-        let off = self.settings.model_error * (own[k] - model.x0[k]);
-        let start = 3.0 * self.settings.start[k];
-        off * off + start * start
     }
 
     fn sets(&self, h: &Hypothesis, action: Action) -> Kinds {
@@ -699,9 +687,9 @@ impl Bank {
                 Action::Home | Action::Drift(_) => {
                     let size = layout.size();
                     for k in 0..n {
-                        let variance = self.own_variance(model, &state.own, k);
-                        child.open(k, state.own[k], variance);
-                        child.before[k] = state.own[k];
+                        let variance = state.own.variance(model, &self.settings, k);
+                        child.open(k, state.own.x[k], variance);
+                        child.before[k] = state.own.x[k];
                     }
                     for (k, size) in model.load_size.iter().enumerate() {
                         child.open(layout.load() + k, 0.0, 0.01 * size * size);

@@ -15,6 +15,7 @@ mod competition;
 mod hypothesis;
 mod linear;
 mod model;
+mod own_run;
 mod start;
 
 use alloc::vec::Vec;
@@ -27,6 +28,7 @@ use competition::{Candidates, QUIET};
 use hypothesis::Innovation;
 use linear::dot;
 use model::ModeModel;
+use own_run::OwnRun;
 use serde::{Deserialize, Serialize};
 
 /// Most hypotheses that stay after a sample.
@@ -155,9 +157,8 @@ pub struct BankState {
     apart: Sensors,
     /// Running mean of the leading hypothesis's squared whitened innovation.
     misfit: f64,
-    /// The model's own run under the input alone (n), and its outputs (p).
-    own: Vec<f64>,
-    own_output: Vec<f64>,
+    /// The model's own run under the commands alone.
+    own: OwnRun,
     /// Outputs that the leading hypothesis expects of healthy sensors (p).
     pub expected: Vec<f64>,
     /// What the readings leave unexplained; of an accused sensor its fault (p).
@@ -177,7 +178,7 @@ pub struct BankState {
 crate::state!(BankState {
     parts: [
         slots, seen, candidates, scratch, trial, u, moved, noise, noise_ratio, evidence, mean, count, own,
-        own_output, expected, residual, load
+        expected, residual, load
     ],
     constants: [],
     counters: [
@@ -231,7 +232,7 @@ impl Bank {
         }
         state.mode = Some(mode);
         let bias = self.output_error();
-        self.run_alone(state, model);
+        state.own.read(layout, model, &state.slots[state.best].z);
         for slot in state.live.slots() {
             let h = &state.slots[slot];
             let seen = &mut state.seen[slot];
@@ -265,6 +266,8 @@ impl Bank {
         }
         state.first = false;
         self.learn_noise(state, reading);
+        let z = &state.slots[state.best].z;
+        state.own.learn(layout, model, &self.settings, z);
         let displaced = self.displaced(state, state.best, model, reading, DISPLACED);
         state.apart = self.displaced(state, state.best, model, reading, APART);
         state.suspect |= displaced & !state.slots[state.best].accused();
@@ -326,17 +329,6 @@ impl Bank {
         }
     }
 
-    /// Outputs of the model's own run, with the disturbance as it is known.
-    fn run_alone(&self, state: &mut BankState, model: &ModeModel) {
-        let Layout { n, p, d, .. } = self.layout;
-        let z = &state.slots[state.best].z;
-        for q in 0..p {
-            state.own_output[q] = model.output_offset[q]
-                + dot(&model.c[q * n..(q + 1) * n], &state.own)
-                + dot(&model.f[q * d..(q + 1) * d], &z[n..n + d]);
-        }
-    }
-
     /// Which sensors repeat one value while the model moves.
     fn watch(&self, state: &mut BankState, head: usize, reading: Reading<'_>) {
         let p = self.layout.p;
@@ -382,20 +374,13 @@ impl Bank {
         reading: Reading<'_>,
         limit: f64,
     ) -> Sensors {
-        let Layout { n, p, d, .. } = self.layout;
         let z = &state.slots[slot].z;
         let mut set = 0;
-        for q in 0..p.min(64) {
-            let output = model.output_offset[q]
-                + dot(&model.c[q * n..(q + 1) * n], &z[..n])
-                + dot(&model.f[q * d..(q + 1) * d], &z[n..n + d]);
-            let mut variance = reading.noise[q] * reading.noise[q];
-            for k in 0..n {
-                let c = model.c[q * n + k];
-                variance += c * c * self.own_variance(model, &state.own, k);
-            }
-            let off = output - state.own_output[q];
-            if off * off > limit * variance {
+        for q in 0..self.layout.p.min(64) {
+            let noise = reading.noise[q];
+            let own = state.own.covariance(model, &self.settings, q, q);
+            let off = state.own.offset(self.layout, model, z, q);
+            if off * off > limit * (noise * noise + own) {
                 set |= 1 << q;
             }
         }
@@ -482,16 +467,9 @@ impl Bank {
             *d = new - *old;
             *old = new;
         }
-        let Layout { n, m, d, .. } = self.layout;
         let z = &state.slots[state.best].z;
-        for i in 0..n {
-            let mut sum = model.state_offset[i]
-                + dot(&model.a[i * n..(i + 1) * n], &state.own)
-                + dot(&model.e[i * d..(i + 1) * d], &z[n..n + d]);
-            sum += dot(&model.b[i * m..(i + 1) * m], u);
-            state.scratch[i] = crate::kernel::bounded(sum);
-        }
-        state.own.copy_from_slice(&state.scratch[..n]);
+        let next = &mut state.scratch[..self.layout.n];
+        state.own.advance(self.layout, model, z, u, next);
         for slot in state.live.slots() {
             state.slots[slot].advance(
                 self.layout,

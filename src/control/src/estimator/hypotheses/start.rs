@@ -4,6 +4,7 @@ use super::competition::{Candidates, UNLIKE};
 use super::hypothesis::{Hypothesis, Innovation};
 use super::linear::{axpy, factor, solve};
 use super::model::{Layout, ModeModel};
+use super::own_run::OwnRun;
 use super::{Bank, BankState, Live, NOISE_AT_START, NOISE_PRIOR, Prices, SLOTS};
 use crate::matrix::Matrix;
 use crate::parameters::{Channels, Hypotheses, ModeModel as Described};
@@ -228,8 +229,7 @@ impl Bank {
             best: 0,
             apart: 0,
             misfit: p as f64,
-            own: model.x0.clone(),
-            own_output: vec![0.0; p],
+            own: OwnRun::new(model, settings),
             expected: vec![0.0; p],
             residual: vec![0.0; p],
             accused: 0,
