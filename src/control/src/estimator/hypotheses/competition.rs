@@ -22,6 +22,8 @@ const TOGETHER: f64 = 1.5;
 pub(super) const UNLIKE: f64 = 2.0;
 /// Price of a fault before the first sample: one sensor in a hundred.
 const AT_START: f64 = -4.6;
+/// Variance of loads and input gains that are said to be gone, relative to that of their jumps.
+const REMAINS: f64 = 0.01;
 /// Mean of the relative error of a sensor's wrong gain.
 const SCALE_MEAN: f64 = -0.5;
 /// Its variance.
@@ -183,9 +185,8 @@ impl Bank {
             });
         }
         if unlikely && !state.first && self.displaced(state, slot, model, reading, APART) != 0 {
-            let value = score
-                + self.prices.fault
-                + self.trial(state, slot, model, reading, Action::Home);
+            let value =
+                score + self.prices.fault + self.trial(state, slot, model, reading, Action::Home);
             state.candidates.add(Candidate {
                 score: value,
                 parent: slot,
@@ -259,7 +260,7 @@ impl Bank {
             if has(free, q) && state.evidence[q] > FREEZING && slot == state.live.first() {
                 let value = score
                     + self.prices.stuck
-                    + state.evidence[q]
+                    + state.evidence_before[q]
                     + self.trial(state, slot, model, reading, Action::Freeze(q));
                 state.candidates.add(Candidate {
                     score: value,
@@ -318,7 +319,8 @@ impl Bank {
         let trusted = self.settings.trusts_model();
         let limit = if trusted { DISPLACED } else { APART };
         let set = self.displaced(state, slot, model, reading, limit) & reading.valid;
-        let known = |other: usize| state.slots[other].additive == set && !state.slots[other].convinced;
+        let known =
+            |other: usize| state.slots[other].additive == set && !state.slots[other].convinced;
         if set == 0 || !trusted && state.live.slots().any(known) {
             return;
         }
@@ -685,16 +687,18 @@ impl Bank {
                     }
                 }
                 Action::Home | Action::Drift(_) => {
-                    let size = layout.size();
                     for k in 0..n {
                         let variance = state.own.variance(model, &self.settings, k);
                         child.open(k, state.own.x[k], variance);
                         child.before[k] = state.own.x[k];
                     }
                     for (k, size) in model.load_size.iter().enumerate() {
-                        child.open(layout.load() + k, 0.0, 0.01 * size * size);
+                        child.open(layout.load() + k, 0.0, REMAINS * size * size);
                     }
-                    let _ = size;
+                    let gain = self.settings.gain_error;
+                    for k in layout.gain()..fault {
+                        child.open(k, 0.0, REMAINS * gain * gain);
+                    }
                     for q in 0..p {
                         if has(child.additive, q) {
                             child.open(

@@ -148,8 +148,10 @@ pub struct BankState {
     /// Its variance relative to the design's (p), and how many samples it rests on.
     noise_ratio: Vec<f64>,
     noise_samples: f64,
-    /// Evidence that a sensor repeats one value, that value's mean, and of how many samples (p each).
+    /// Evidence that a sensor repeats one value, the same before this sample, that value's mean, and of how
+    /// many samples (p each).
     evidence: Vec<f64>,
+    evidence_before: Vec<f64>,
     mean: Vec<f64>,
     count: Vec<f64>,
     best: usize,
@@ -177,8 +179,23 @@ pub struct BankState {
 
 crate::state!(BankState {
     parts: [
-        slots, seen, candidates, scratch, trial, u, moved, noise, noise_ratio, evidence, mean, count, own,
-        expected, residual, load
+        slots,
+        seen,
+        candidates,
+        scratch,
+        trial,
+        u,
+        moved,
+        noise,
+        noise_ratio,
+        evidence,
+        evidence_before,
+        mean,
+        count,
+        own,
+        expected,
+        residual,
+        load
     ],
     constants: [],
     counters: [
@@ -333,6 +350,7 @@ impl Bank {
     fn watch(&self, state: &mut BankState, head: usize, reading: Reading<'_>) {
         let p = self.layout.p;
         let (h, seen) = (&state.slots[head], &state.seen[head]);
+        state.evidence_before.copy_from_slice(&state.evidence);
         for q in 0..p {
             if !has(reading.valid, q) || has(h.stuck, q) {
                 state.evidence[q] = 0.0;

@@ -224,6 +224,7 @@ impl Bank {
             noise_ratio: vec![NOISE_AT_START; p],
             noise_samples: NOISE_PRIOR,
             evidence: vec![0.0; p],
+            evidence_before: vec![0.0; p],
             mean: vec![0.0; p],
             count: vec![0.0; p],
             best: 0,
