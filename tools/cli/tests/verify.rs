@@ -255,17 +255,17 @@ fn parts_that_do_not_belong_together() {
         .insert(CERTIFICATE.into(), other.files[CERTIFICATE].clone());
     certificate.refused("foreign certificate", 1, &[CERTIFICATE, "another design"]);
 
-    for path in [
-        "state_feedback/gamma/0",
-        "state_feedback/decay",
-        "observer/spec/decay",
-        "state_feedback/certificate/lyapunov/0/core/0/0",
-        "running_loop/noise_gain/0",
+    for (path, factor) in [
+        ("state_feedback/gamma/0", 0.99),
+        ("state_feedback/decay", 0.5),
+        ("observer/certificate/lyapunov/0/0/0", -1.0),
+        ("state_feedback/certificate/lyapunov/0/core/0/0", 0.5),
+        ("running_loop/noise_gain/0", 0.99),
     ] {
         let mut exported = Exported::new(SOUND);
         exported.change(CERTIFICATE, |value| {
             let number = value.pointer_mut(&format!("/proof/{path}"));
-            scaled(number.unwrap(), 0.5);
+            scaled(number.unwrap(), factor);
         });
         exported.refused(path, 1, &["proved", "export"]);
     }
@@ -297,9 +297,11 @@ fn a_careful_forger_is_found_out() {
     }
 
     // The range of an input stands in the description, too.
-    let mut limit = Exported::new(SOUND);
+    let limited =
+        "[signals]\ninputs = [{ name = \"c\", min = -9.0, max = 9.0 }, { name = \"d\" }]\n";
+    let mut limit = Exported::new(&SOUND.replace("[signals]\n", limited));
     limit.change(DESIGN, |design| {
-        design["signals"]["inputs"][0]["max"] = 1e-9.into();
+        design["signals"]["inputs"][0]["max"] = 8.0.into();
     });
     limit.seal();
     limit.refused("limit", 1, &[DESCRIPTION, "line"]);
@@ -311,7 +313,7 @@ fn a_careful_forger_is_found_out() {
         *entry = (entry.as_f64().unwrap() + 0.1).into();
     });
     observer.seal();
-    observer.refused("observer that runs", 1, &["observer"]);
+    observer.refused("observer that runs", 1, &["proved"]);
 
     let mut wild = Exported::new(SOUND);
     wild.change(DESIGN, |design| {
@@ -335,7 +337,7 @@ fn a_careful_forger_is_found_out() {
             scaled(gamma, 0.99);
         }
     });
-    gamma.refused("gamma lowered", 1, &["gamma", "proved"]);
+    gamma.refused("gamma lowered", 1, &["attenuation", "proved"]);
 }
 
 #[test]

@@ -4,8 +4,7 @@ use super::figure::{Figure, Mark, Series};
 use super::page::{Column, KeyNumber, Page, Row, Section, Table};
 use super::{demo, svg};
 use ftc_control::parameters::{
-    Compensation, Estimator, EstimatorMethod, FeedbackGains, Observer, ObserverKind,
-    StateFeedback,
+    Compensation, Estimator, EstimatorMethod, FeedbackGains, Observer, ObserverKind, StateFeedback,
 };
 use ftc_control::{Controller, Matrix};
 use ftc_design::{ControllerDesign, Design, FORMAT, Signal, Signals};
