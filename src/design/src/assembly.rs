@@ -3,7 +3,7 @@
 use super::commissioning::{self, Database, LONGEST_RESPONSE, RecordedDisturbance};
 use super::harmonics;
 pub use super::harmonics::KnownDisturbance;
-use super::hypotheses::HypothesesSpec;
+use super::hypotheses::{self, HypothesesSpec};
 use super::matrices::{dense, plain};
 use super::{
     ControlSpec, ControllerDesign, Design, DesignError, FORMAT, Failure, ObserverSpec,
@@ -301,8 +301,10 @@ fn estimator(request: &Request, dims: Dimensions) -> Result<Estimator, RequestEr
     let hypotheses = state_based.then(|| {
         let known = spec.disturbance.as_ref();
         let noise = sensor_noise(&request.scenario.noise, &thresholds);
+        let (plant, signals) = (&request.plant, &request.signals);
+        let reach = hypotheses::reach(plant, &request.control.tracked, &request.scenario);
         spec.hypotheses
-            .settings(&request.plant, &request.signals, noise, known)
+            .settings(plant, signals, noise, &reach, known)
     });
     Ok(Estimator {
         method: spec.method,

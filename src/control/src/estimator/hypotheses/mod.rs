@@ -37,6 +37,8 @@ const KEEP: usize = 12;
 const SLOTS: usize = 2 * KEEP;
 /// Evidence of a frozen sensor from which it is considered, in log likelihood.
 const FREEZING: f64 = 4.0;
+/// What the very same reading says for a frozen sensor while the model's own run moves, in log likelihood.
+const REPEATS: f64 = 5.0;
 /// Deviations (squared) of the model's own run from which loads are said to have moved an output.
 const DISPLACED: f64 = 36.0;
 /// The same, from which it is considered that they are gone.
@@ -152,6 +154,9 @@ pub struct BankState {
     /// many samples (p each).
     evidence: Vec<f64>,
     evidence_before: Vec<f64>,
+    /// The reading that repeats, and the output of the model's own run when it came first (p each).
+    repeated: Vec<f64>,
+    moved_from: Vec<f64>,
     mean: Vec<f64>,
     count: Vec<f64>,
     best: usize,
@@ -190,6 +195,8 @@ crate::state!(BankState {
         noise_ratio,
         evidence,
         evidence_before,
+        repeated,
+        moved_from,
         mean,
         count,
         own,
@@ -359,6 +366,11 @@ impl Bank {
             }
             let y = reading.y[q];
             let variance = reading.noise[q] * reading.noise[q];
+            if y != state.repeated[q] {
+                state.repeated[q] = y;
+                state.moved_from[q] = state.own.y[q];
+            }
+            let moved = state.own.y[q] - state.moved_from[q];
             if state.count[q] == 0.0 {
                 state.mean[q] = y;
                 state.count[q] = 1.0;
@@ -370,7 +382,8 @@ impl Bank {
             let gain = 0.5 * (seen.r[q] * seen.r[q] / s).min(50.0)
                 - 0.5 * off * off / (variance * (1.0 + 1.0 / state.count[q]))
                 - 0.02;
-            state.evidence[q] += gain;
+            let repeats = moved * moved > DISPLACED * variance;
+            state.evidence[q] += if repeats { gain.max(REPEATS) } else { gain };
             if state.evidence[q] <= 0.0 {
                 state.evidence[q] = 0.0;
                 state.mean[q] = y;

@@ -225,6 +225,8 @@ impl Bank {
             noise_samples: NOISE_PRIOR,
             evidence: vec![0.0; p],
             evidence_before: vec![0.0; p],
+            repeated: vec![0.0; p],
+            moved_from: vec![0.0; p],
             mean: vec![0.0; p],
             count: vec![0.0; p],
             best: 0,
