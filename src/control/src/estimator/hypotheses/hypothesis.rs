@@ -3,7 +3,7 @@
 // Matrices are flat and addressed by row and column, as in the equations.
 #![allow(clippy::needless_range_loop)]
 
-use super::linear::{axpy, dot, factor, solve};
+use super::linear::{add_row, combine, dot, factor, padded, solve, sparse_dot, subtract_squares};
 use super::model::{Jump, Layout, ModeModel};
 use crate::kernel::bounded;
 use crate::parameters::Hypotheses as Settings;
@@ -22,9 +22,9 @@ pub const fn has(set: Sensors, q: usize) -> bool {
 /// One hypothesis.
 #[derive(Debug, PartialEq, Serialize, Deserialize)]
 pub struct Hypothesis {
-    /// Estimate of the joint state (N).
+    /// Estimate of the joint state (N, padded).
     pub z: Vec<f64>,
-    /// Its covariance (N x N).
+    /// Its covariance (N rows, padded).
     pub cov: Vec<f64>,
     /// Estimate of the state a sample ago (n).
     pub before: Vec<f64>,
@@ -49,7 +49,9 @@ pub struct Hypothesis {
 pub struct Innovation {
     /// `y - y_hat` (p).
     pub r: Vec<f64>,
-    /// `C P` (p x N).
+    /// Output that is predicted of a healthy sensor (p).
+    pub output: Vec<f64>,
+    /// `C P` (p rows of N, padded).
     pub rows: Vec<f64>,
     /// Its covariance, then its Cholesky factor (p x p).
     pub s: Vec<f64>,
@@ -80,7 +82,7 @@ crate::state!(Hypothesis {
     counters: [additive, stuck, scaled, convinced, loose, score, misfit]
 });
 crate::state!(Innovation {
-    parts: [r, rows, s, weights, white],
+    parts: [r, output, rows, s, weights, white],
     constants: [],
     counters: [square, sound]
 });
@@ -91,7 +93,8 @@ impl Innovation {
         let p = layout.p;
         Self {
             r: vec![0.0; p],
-            rows: vec![0.0; p * layout.size()],
+            output: vec![0.0; p],
+            rows: vec![0.0; p * layout.stride()],
             s: vec![0.0; p * p],
             weights: vec![[1.0, 0.0]; p],
             white: vec![0.0; p],
@@ -110,44 +113,33 @@ impl Innovation {
         kinds: Kinds,
         bias: bool,
     ) {
-        let Layout { n, p, d, .. } = layout;
-        let (size, fault) = (layout.size(), layout.fault());
-        let active = if bias || kinds.all() | h.accused() != 0 {
-            size
+        let p = layout.p;
+        let (stride, fault) = (layout.stride(), layout.fault());
+        let width = padded(if bias || kinds.all() | h.accused() != 0 {
+            layout.size()
         } else {
             fault
-        };
+        });
         for q in 0..p {
-            let row = &mut self.rows[q * size..q * size + active];
-            row.fill(0.0);
-            self.s[q * p..q * p + q].fill(0.0);
+            let row = &mut self.rows[q * stride..q * stride + width];
+            let seen = model.outputs.row(q);
+            let output = model.output(q, &h.z, &h.z);
+            self.output[q] = output;
             if !has(reading.valid, q) {
+                row.fill(0.0);
+                self.s[q * p..q * p + q].fill(0.0);
                 self.r[q] = 0.0;
                 self.s[q * p + q] = 1.0;
                 continue;
             }
             let noise = reading.noise[q];
             let k = fault + q;
-            let c = &model.c[q * n..(q + 1) * n];
-            let f = &model.f[q * d..(q + 1) * d];
-            let output = model.output_offset[q] + dot(c, &h.z[..n]) + dot(f, &h.z[n..n + d]);
             let (scale, slot) = kinds.weights(q, output, h.z[k], bias);
-            if scale != 0.0 {
-                for (j, &factor) in c.iter().enumerate() {
-                    axpy(row, scale * factor, &h.cov[j * size..j * size + active]);
-                }
-                for (j, &factor) in f.iter().enumerate() {
-                    if factor != 0.0 {
-                        axpy(
-                            row,
-                            scale * factor,
-                            &h.cov[(n + j) * size..(n + j) * size + active],
-                        );
-                    }
-                }
-            }
+            let seen = if scale != 0.0 { seen } else { &[] };
+            let terms = seen.iter().map(|&(at, factor)| (at, scale * factor));
+            combine(row, &h.cov, stride, terms);
             if slot != 0.0 {
-                axpy(row, slot, &h.cov[k * size..k * size + active]);
+                add_row(row, slot, &h.cov[k * stride..k * stride + width]);
             }
             self.r[q] = reading.y[q]
                 - if has(kinds.scaled, q) {
@@ -156,21 +148,20 @@ impl Innovation {
                     scale * output + slot * h.z[k]
                 };
             self.weights[q] = [scale, slot];
-            let row = &self.rows[q * size..q * size + active];
-            for j in 0..=q {
-                let mut sum = 0.0;
+            let covariances = &mut self.s[q * p..=q * p + q];
+            for (j, (sum, &[scale, slot])) in covariances.iter_mut().zip(&self.weights).enumerate()
+            {
+                *sum = 0.0;
                 if has(reading.valid, j) {
-                    let [scale, slot] = self.weights[j];
                     if scale != 0.0 {
-                        sum = scale
-                            * (dot(&model.c[j * n..(j + 1) * n], &row[..n])
-                                + dot(&model.f[j * d..(j + 1) * d], &row[n..n + d]));
+                        *sum = scale
+                            * (sparse_dot(model.outputs.part(j, 0), row)
+                                + sparse_dot(model.outputs.part(j, 1), row));
                     }
                     if slot != 0.0 {
-                        sum += slot * row[fault + j];
+                        *sum += slot * row[fault + j];
                     }
                 }
-                self.s[q * p + j] = sum;
             }
             self.s[q * p + q] += noise * noise;
         }
@@ -255,10 +246,10 @@ impl Hypothesis {
     }
     /// Nothing but the start.
     pub fn new(layout: Layout) -> Self {
-        let size = layout.size();
+        let stride = layout.stride();
         Self {
-            z: vec![0.0; size],
-            cov: vec![0.0; size * size],
+            z: vec![0.0; stride],
+            cov: vec![0.0; layout.size() * stride],
             before: vec![0.0; layout.n],
             additive: 0,
             stuck: 0,
@@ -300,12 +291,12 @@ impl Hypothesis {
 
     /// Forgets entry `k` and opens it with `variance` around `mean`.
     pub fn open(&mut self, k: usize, mean: f64, variance: f64) {
-        let size = self.z.len();
-        self.cov[k * size..(k + 1) * size].fill(0.0);
-        for row in self.cov.chunks_exact_mut(size) {
+        let stride = self.z.len();
+        self.cov[k * stride..(k + 1) * stride].fill(0.0);
+        for row in self.cov.chunks_exact_mut(stride) {
             row[k] = 0.0;
         }
-        self.cov[k * size + k] = variance;
+        self.cov[k * stride + k] = variance;
         self.z[k] = mean;
     }
 
@@ -314,28 +305,25 @@ impl Hypothesis {
         if !seen.sound {
             return;
         }
-        let (p, size) = (layout.p, layout.size());
+        let (p, stride) = (layout.p, layout.stride());
         let active = self.active(layout, bias);
+        let width = padded(active);
+        // The rows of `L^-1 C P`.
         for i in 0..p {
-            let (done, rest) = seen.rows.split_at_mut(i * size);
-            let row = &mut rest[..active];
-            for j in 0..i {
-                axpy(row, -seen.s[i * p + j], &done[j * size..j * size + active]);
+            let (done, rest) = seen.rows.split_at_mut(i * stride);
+            let row = &mut rest[..width];
+            for (&factor, other) in seen.s[i * p..].iter().zip(done.chunks_exact(stride)) {
+                add_row(row, -factor, &other[..width]);
             }
             let scale = 1.0 / seen.s[i * p + i];
             row.iter_mut().for_each(|v| *v *= scale);
-            let white = seen.white[i];
-            axpy(&mut self.z[..active], white, row);
-            for k in 0..active {
-                let factor = -row[k];
-                if factor != 0.0 {
-                    axpy(&mut self.cov[k * size..k * size + active], factor, row);
-                }
-            }
+            add_row(&mut self.z[..width], seen.white[i], row);
         }
         for v in &mut self.z {
             *v = bounded(*v);
         }
+        let rows = &seen.rows[..p * stride];
+        subtract_squares(&mut self.cov, rows, stride, active, width);
     }
 
     /// One sample on under the input `u` (m), which moved by `du` (m). `scratch` holds n x N.
@@ -352,11 +340,15 @@ impl Hypothesis {
         du: &[f64],
         scratch: &mut [f64],
     ) {
-        let Layout { n, m, p, d, .. } = layout;
-        let (size, load, gain, fault) =
-            (layout.size(), layout.load(), layout.gain(), layout.fault());
+        let Layout { n, p, d, .. } = layout;
+        let (stride, load, gain, fault) = (
+            layout.stride(),
+            layout.load(),
+            layout.gain(),
+            layout.fault(),
+        );
         let active = self.active(layout, bias);
-        let loads = layout.loads();
+        let width = padded(active);
         let error = if self.loose {
             settings.changed_error
         } else {
@@ -372,20 +364,21 @@ impl Hypothesis {
         }
         for i in 0..n {
             let mut sum = 0.0;
-            for (&a, &s) in model.a[i * n..(i + 1) * n].iter().zip(moved.iter()) {
-                sum += a * a * s;
+            for &(at, a) in model.motion.part(i, 0) {
+                sum += a * a * moved[at];
             }
-            for (&b, &s) in model.b[i * m..(i + 1) * m].iter().zip(du) {
+            for &(at, b) in model.by_gain.row(i) {
+                let s = du[at - gain];
                 sum += b * b * s * s;
             }
             let k = load + layout.state_load() + i;
-            self.cov[k * size + k] += error * sum;
+            self.cov[k * stride + k] += error * sum;
         }
         for (k, wander) in (load..gain).zip(&model.load_walk) {
-            self.cov[k * size + k] += wander * wander;
+            self.cov[k * stride + k] += wander * wander;
         }
         for k in gain..fault {
-            self.cov[k * size + k] += settings.gain_walk * settings.gain_walk;
+            self.cov[k * stride + k] += settings.gain_walk * settings.gain_walk;
         }
         for pair in 0..d / 2 {
             let angle = settings.angles[pair % settings.angles.len()];
@@ -396,87 +389,52 @@ impl Hypothesis {
             let step = settings.period_error * angle;
             let variance = step * step * amplitude + 1e-8 * size_squared;
             for k in [k, k + 1] {
-                self.cov[k * size + k] += variance;
+                self.cov[k * stride + k] += variance;
             }
         }
         if bias {
             for q in 0..p {
                 let mut sum = 0.0;
-                for (&c, &s) in model.c[q * n..(q + 1) * n].iter().zip(moved.iter()) {
-                    sum += c * c * s;
+                for &(at, c) in model.outputs.part(q, 0) {
+                    sum += c * c * moved[at];
                 }
                 let k = fault + q;
-                self.cov[k * size + k] += error * sum;
+                self.cov[k * stride + k] += error * sum;
             }
         }
         // Rows of F P that belong to x.
         for i in 0..n {
-            let row = &mut scratch[i * size..i * size + active];
-            row.fill(0.0);
-            for (j, &factor) in model.a[i * n..(i + 1) * n].iter().enumerate() {
-                axpy(row, factor, &self.cov[j * size..j * size + active]);
-            }
-            for (j, &factor) in model.e[i * d..(i + 1) * d].iter().enumerate() {
-                if factor != 0.0 {
-                    axpy(
-                        row,
-                        factor,
-                        &self.cov[(n + j) * size..(n + j) * size + active],
-                    );
-                }
-            }
-            for (k, &factor) in (load..gain).zip(&model.g[i * loads..(i + 1) * loads]) {
-                if factor != 0.0 {
-                    axpy(row, factor, &self.cov[k * size..k * size + active]);
-                }
-            }
-            for (j, (&b, &u)) in model.b[i * m..(i + 1) * m].iter().zip(u).enumerate() {
-                let factor = b * u;
-                if factor != 0.0 {
-                    axpy(
-                        row,
-                        factor,
-                        &self.cov[(gain + j) * size..(gain + j) * size + active],
-                    );
-                }
-            }
+            let row = &mut scratch[i * stride..i * stride + width];
+            let gains = model.by_gain.row(i).iter();
+            let gains = gains.map(|&(at, b)| (at, b * u[at - gain]));
+            let terms = model.motion.row(i).iter().copied().chain(gains);
+            combine(row, &self.cov, stride, terms);
         }
         // Their products with F'.
         for i in 0..n {
-            let row = &scratch[i * size..i * size + active];
+            let row = &scratch[i * stride..i * stride + width];
+            self.cov[i * stride + n..i * stride + width].copy_from_slice(&row[n..]);
             for j in 0..=i {
-                let mut sum = dot(&row[..n], &model.a[j * n..(j + 1) * n])
-                    + dot(&row[n..n + d], &model.e[j * d..(j + 1) * d])
-                    + dot(&row[load..gain], &model.g[j * loads..(j + 1) * loads]);
-                for ((&r, &b), &u) in row[gain..fault]
-                    .iter()
-                    .zip(&model.b[j * m..(j + 1) * m])
-                    .zip(u)
-                {
-                    sum += r * b * u;
+                let [a, e, g] = [0, 1, 2].map(|part| model.motion.part(j, part));
+                let mut sum = sparse_dot(a, row) + sparse_dot(e, row) + sparse_dot(g, row);
+                for &(at, b) in model.by_gain.row(j) {
+                    sum += row[at] * b * u[at - gain];
                 }
-                self.cov[i * size + j] = sum;
-                self.cov[j * size + i] = sum;
+                self.cov[i * stride + j] = sum;
+                self.cov[j * stride + i] = sum;
             }
-            for k in n..active {
-                self.cov[i * size + k] = row[k];
-                self.cov[k * size + i] = row[k];
-            }
-            let k = i * size + i;
+            let k = i * stride + i;
             self.cov[k] += 1e-12 * settings.start_elsewhere[i] * settings.start_elsewhere[i];
         }
         // The state.
         for i in 0..n {
+            let [a, e, g] = [0, 1, 2].map(|part| model.motion.part(i, part));
             let mut sum = model.state_offset[i]
-                + dot(&model.g[i * loads..(i + 1) * loads], &self.z[load..gain])
-                + dot(&model.a[i * n..(i + 1) * n], &self.z[..n])
-                + dot(&model.e[i * d..(i + 1) * d], &self.z[n..n + d]);
-            for ((&b, &u), &g) in model.b[i * m..(i + 1) * m]
-                .iter()
-                .zip(u)
-                .zip(&self.z[gain..fault])
-            {
-                sum += b * u * (1.0 + g);
+                + sparse_dot(g, &self.z)
+                + sparse_dot(a, &self.z)
+                + sparse_dot(e, &self.z);
+            for &(at, b) in model.by_gain.row(i) {
+                sum += b * u[at - gain] * (1.0 + self.z[at]);
             }
             scratch[i] = bounded(sum);
         }
@@ -490,47 +448,65 @@ impl Hypothesis {
         for q in 0..p {
             let k = fault + q;
             if has(self.additive, q) {
-                self.cov[k * size + k] += share * share * noise[q] * noise[q];
+                self.cov[k * stride + k] += share * share * noise[q] * noise[q];
             }
             if has(self.scaled, q) {
-                self.cov[k * size + k] += 1e-6;
+                self.cov[k * stride + k] += 1e-6;
             }
         }
         self.limit(layout, model, settings, active);
     }
 
+    /// The disturbance turns; then what stands below the rows of plant state and disturbance is made
+    /// their mirror image.
     fn rotate(&mut self, layout: Layout, rotation: &[(f64, f64)], active: usize) {
-        let size = layout.size();
+        let stride = layout.stride();
+        let (first, last) = (layout.n, layout.load());
         for (h, &(c, s)) in rotation.iter().enumerate() {
-            let k = layout.n + 2 * h;
+            let k = first + 2 * h;
             let (a, b) = (self.z[k], self.z[k + 1]);
             self.z[k] = c * a + s * b;
             self.z[k + 1] = c * b - s * a;
-            let (above, below) = self.cov.split_at_mut((k + 1) * size);
-            for (a, b) in above[k * size..k * size + active]
-                .iter_mut()
-                .zip(&mut below[..active])
-            {
+            let (above, below) = self.cov.split_at_mut((k + 1) * stride);
+            let rows = above[k * stride..].iter_mut().zip(&mut below[..stride]);
+            for (a, b) in rows {
                 let (x, y) = (*a, *b);
                 *a = c * x + s * y;
                 *b = c * y - s * x;
             }
-            for row in self.cov.chunks_exact_mut(size).take(active) {
-                let (x, y) = (row[k], row[k + 1]);
-                row[k] = c * x + s * y;
-                row[k + 1] = c * y - s * x;
+            for row in self.cov.chunks_exact_mut(stride).take(last) {
+                let pair = &mut row[k..k + 2];
+                let (x, y) = (pair[0], pair[1]);
+                pair[0] = c * x + s * y;
+                pair[1] = c * y - s * x;
             }
-            let mean = 0.5 * (self.cov[k * size + k + 1] + self.cov[(k + 1) * size + k]);
-            self.cov[k * size + k + 1] = mean;
-            self.cov[(k + 1) * size + k] = mean;
+            let mean = 0.5 * (self.cov[k * stride + k + 1] + self.cov[(k + 1) * stride + k]);
+            self.cov[k * stride + k + 1] = mean;
+            self.cov[(k + 1) * stride + k] = mean;
+        }
+        let (above, below) = self.cov.split_at_mut(last * stride);
+        for (i, row) in above.chunks_exact(stride).enumerate() {
+            for (target, &value) in below.chunks_exact_mut(stride).zip(&row[last..active]) {
+                target[i] = value;
+            }
+        }
+        let (above, below) = self.cov.split_at_mut(first * stride);
+        for (i, row) in above.chunks_exact(stride).enumerate() {
+            for (target, &value) in below.chunks_exact_mut(stride).zip(&row[first..last]) {
+                target[i] = value;
+            }
         }
     }
 
     /// Keeps every variance below what is thought possible.
     fn limit(&mut self, layout: Layout, model: &ModeModel, settings: &Settings, active: usize) {
         let Layout { n, d, .. } = layout;
-        let (size, load, gain, fault) =
-            (layout.size(), layout.load(), layout.gain(), layout.fault());
+        let (stride, load, gain, fault) = (
+            layout.stride(),
+            layout.load(),
+            layout.gain(),
+            layout.fault(),
+        );
         for k in 0..active {
             let most = if k < n {
                 1e8 * settings.start_elsewhere[k] * settings.start_elsewhere[k]
@@ -546,7 +522,7 @@ impl Hypothesis {
             } else {
                 model.bias[k - fault] * settings.model_error * settings.model_error
             };
-            let variance = self.cov[k * size + k];
+            let variance = self.cov[k * stride + k];
             if (0.0..=most).contains(&variance) {
                 continue;
             }
@@ -567,12 +543,12 @@ impl Hypothesis {
                 0.0
             };
             for j in 0..active {
-                let v = self.cov[k * size + j] * scale;
+                let v = self.cov[k * stride + j] * scale;
                 let v = if v.is_finite() { v } else { 0.0 };
-                self.cov[k * size + j] = v;
-                self.cov[j * size + k] = v;
+                self.cov[k * stride + j] = v;
+                self.cov[j * stride + k] = v;
             }
-            self.cov[k * size + k] = most;
+            self.cov[k * stride + k] = most;
         }
     }
 
@@ -586,33 +562,33 @@ impl Hypothesis {
         gain_error: f64,
     ) {
         let Layout { n, m, .. } = layout;
-        let (size, load, gain) = (layout.size(), layout.load(), layout.gain());
+        let (stride, load, gain) = (layout.stride(), layout.load(), layout.gain());
         let loads = layout.loads();
         for k in jump.loads.clone() {
             let variance = model.load_size[k] * model.load_size[k];
             let at = load + k;
-            self.cov[at * size + at] += variance;
+            self.cov[at * stride + at] += variance;
             for i in 0..n {
                 let left = variance * model.g[i * loads + k];
                 if left == 0.0 {
                     continue;
                 }
-                self.cov[i * size + at] += left;
-                self.cov[at * size + i] += left;
+                self.cov[i * stride + at] += left;
+                self.cov[at * stride + i] += left;
                 for j in 0..n {
-                    self.cov[i * size + j] += left * model.g[j * loads + k];
+                    self.cov[i * stride + j] += left * model.g[j * loads + k];
                 }
             }
         }
         for k in jump.gains.clone() {
             let variance = gain_error * gain_error;
-            self.cov[(gain + k) * size + gain + k] += variance;
+            self.cov[(gain + k) * stride + gain + k] += variance;
             for i in 0..n {
                 let left = model.b[i * m + k] * u[k];
-                self.cov[i * size + gain + k] += variance * left;
-                self.cov[(gain + k) * size + i] += variance * left;
+                self.cov[i * stride + gain + k] += variance * left;
+                self.cov[(gain + k) * stride + i] += variance * left;
                 for j in 0..n {
-                    self.cov[i * size + j] += variance * left * (model.b[j * m + k] * u[k]);
+                    self.cov[i * stride + j] += variance * left * (model.b[j * m + k] * u[k]);
                 }
             }
         }

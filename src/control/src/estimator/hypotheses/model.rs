@@ -1,6 +1,6 @@
 //! What the estimator knows beforehand: the plant per mode, and sizes and rates of what may happen.
 
-use super::linear::{multiply, multiply_transposed};
+use super::linear::{Sparse, multiply, multiply_transposed, padded, sparse_dot};
 use alloc::vec;
 use alloc::vec::Vec;
 use core::ops::Range;
@@ -56,6 +56,10 @@ impl Layout {
     pub const fn size(self) -> usize {
         self.fault() + self.p
     }
+    /// The length of a padded row of the covariance.
+    pub const fn stride(self) -> usize {
+        padded(self.size())
+    }
 }
 
 /// One mode, row after row: `x+ = A x + B u + a + E_d d + G l + B diag(u) g`, `y = C x + c + F_d d`.
@@ -93,6 +97,12 @@ pub struct ModeModel {
     pub bias: Vec<f64>,
     /// `B^+` (m x n): the input that would act as a load does.
     pub b_inverse: Vec<f64>,
+    /// `A`, `E_d` and `G` side by side: what moves the state, by entries of the joint state.
+    pub motion: Sparse,
+    /// `B`, by the gain errors in the joint state.
+    pub by_gain: Sparse,
+    /// `C` and `F_d` side by side: the outputs, by entries of the joint state.
+    pub outputs: Sparse,
 }
 
 impl ModeModel {
@@ -112,6 +122,9 @@ impl ModeModel {
     ) -> Self {
         let Layout { n, m, p, .. } = layout;
         let (x0, u0, y0) = point;
+        let motion = Sparse::new(n, [(0, &a), (n, &e), (layout.load(), &g)]);
+        let by_gain = Sparse::new(n, [(layout.gain(), &b)]);
+        let outputs = Sparse::new(p, [(0, &c), (n, &f)]);
         let mut state_offset = x0.to_vec();
         for (i, value) in state_offset.iter_mut().enumerate() {
             for j in 0..n {
@@ -172,6 +185,16 @@ impl ModeModel {
             cb,
             bias,
             b_inverse,
+            motion,
+            by_gain,
+            outputs,
         }
+    }
+
+    /// Output `q` at the plant's state `x` (n) and the disturbance in `z`.
+    pub fn output(&self, q: usize, x: &[f64], z: &[f64]) -> f64 {
+        self.output_offset[q]
+            + sparse_dot(self.outputs.part(q, 0), x)
+            + sparse_dot(self.outputs.part(q, 1), z)
     }
 }

@@ -187,13 +187,13 @@ impl Bank {
     pub fn start(&self, mode: usize) -> BankState {
         let layout = self.layout;
         let Layout { n, m, p, d, .. } = layout;
-        let size = layout.size();
+        let stride = layout.stride();
         let settings = &self.settings;
         let model = &self.modes[mode];
         let mut first = Hypothesis::new(layout);
         first.z[..n].copy_from_slice(&model.x0);
         first.before.copy_from_slice(&model.x0);
-        let mut set = |k: usize, deviation: f64| first.cov[k * size + k] = deviation * deviation;
+        let mut set = |k: usize, deviation: f64| first.cov[k * stride + k] = deviation * deviation;
         for i in 0..n {
             set(i, settings.start[i]);
         }
@@ -213,7 +213,7 @@ impl Bank {
             seen: vec![Innovation::new(layout); SLOTS],
             live: Live::ONE,
             candidates: Candidates::new(p, model.jumps.len()),
-            scratch: vec![0.0; n.max(1) * size],
+            scratch: vec![0.0; n.max(1) * stride],
             trial: Innovation::new(layout),
             mode: None,
             u: model.u0.clone(),
@@ -227,6 +227,7 @@ impl Bank {
             misfit: p as f64,
             own: model.x0.clone(),
             own_output: vec![0.0; p],
+            own_spread: vec![0.0; p],
             expected: vec![0.0; p],
             residual: vec![0.0; p],
             accused: 0,
