@@ -87,6 +87,25 @@ crate::state!(Innovation {
     counters: [square, sound]
 });
 
+/// From one sample to the next, the same for every hypothesis.
+#[derive(Clone, Copy, Debug)]
+pub struct Step<'a> {
+    pub layout: Layout,
+    pub model: &'a ModeModel,
+    pub settings: &'a Settings,
+    /// Noise deviation (p).
+    pub noise: &'a [f64],
+    /// Cosine and sine of the angle by which each pair of the disturbance turns.
+    pub rotation: &'a [(f64, f64)],
+    /// The error of that angle, and the least growth of the variance, of each pair.
+    pub waves: &'a [(f64, f64)],
+    /// Whether the model's outputs may be wrong.
+    pub bias: bool,
+    /// The input that acts (m), and how it moved (m).
+    pub u: &'a [f64],
+    pub moved: &'a [f64],
+}
+
 impl Innovation {
     /// Room for `layout`.
     pub fn new(layout: Layout) -> Self {
@@ -326,91 +345,88 @@ impl Hypothesis {
         subtract_squares(&mut self.cov, rows, stride, active, width);
     }
 
-    /// One sample on under the input `u` (m), which moved by `du` (m). `scratch` holds n x N.
-    #[allow(clippy::too_many_arguments)]
-    pub fn advance(
-        &mut self,
-        layout: Layout,
-        model: &ModeModel,
-        settings: &Settings,
-        noise: &[f64],
-        rotation: &[(f64, f64)],
-        bias: bool,
-        u: &[f64],
-        du: &[f64],
-        scratch: &mut [f64],
-    ) {
-        let Layout { n, p, d, .. } = layout;
-        let (stride, load, gain, fault) = (
-            layout.stride(),
-            layout.load(),
-            layout.gain(),
-            layout.fault(),
-        );
-        let active = self.active(layout, bias);
-        let width = padded(active);
+    /// One sample on. `scratch` holds n rows of the covariance.
+    pub fn advance(&mut self, step: &Step<'_>, scratch: &mut [f64]) {
+        let active = self.active(step.layout, step.bias);
+        self.drift(step, scratch);
+        self.propagate(step, active, scratch);
+        self.move_state(step, scratch);
+        self.rotate(step, active);
+        self.wander(step);
+        self.limit(step.layout, step.model, step.settings, active);
+    }
+
+    /// The model's error acts as a load that moves as the state and the input move; loads, gain errors
+    /// and the disturbance wander.
+    #[inline(never)]
+    fn drift(&mut self, step: &Step<'_>, scratch: &mut [f64]) {
+        let Step {
+            layout,
+            model,
+            settings,
+            ..
+        } = *step;
+        let (stride, load, gain) = (layout.stride(), layout.load(), layout.gain());
         let error = if self.loose {
             settings.changed_error
         } else {
             settings.model_error
         };
         let error = error * error;
-        // The model's error acts as a load that moves as the state and the input move.
-        let (moved, _) = scratch.split_at_mut(n);
+        let moved = &mut scratch[..layout.n];
         for ((out, before), &x) in moved.iter_mut().zip(&mut self.before).zip(&self.z) {
             let step = x - *before;
             *out = step * step;
             *before = x;
         }
-        for i in 0..n {
+        let from = load + layout.state_load();
+        for (i, k) in (from..gain).enumerate() {
             let mut sum = 0.0;
             for &(at, a) in model.motion.part(i, 0) {
                 sum += a * a * moved[at];
             }
             for &(at, b) in model.by_gain.row(i) {
-                let s = du[at - gain];
+                let s = step.moved[at - gain];
                 sum += b * b * s * s;
             }
-            let k = load + layout.state_load() + i;
             self.cov[k * stride + k] += error * sum;
         }
-        for (k, wander) in (load..gain).zip(&model.load_walk) {
-            self.cov[k * stride + k] += wander * wander;
+        for (k, growth) in (load..).zip(&model.growth) {
+            self.cov[k * stride + k] += growth;
         }
-        for k in gain..fault {
-            self.cov[k * stride + k] += settings.gain_walk * settings.gain_walk;
-        }
-        for pair in 0..d / 2 {
-            let angle = settings.angles[pair % settings.angles.len()];
-            let k = n + 2 * pair;
-            let size_squared =
-                settings.disturbance_size[2 * pair] * settings.disturbance_size[2 * pair];
+        for (pair, &(angle, least)) in step.waves.iter().enumerate() {
+            let k = layout.n + 2 * pair;
             let amplitude = self.z[k] * self.z[k] + self.z[k + 1] * self.z[k + 1];
-            let step = settings.period_error * angle;
-            let variance = step * step * amplitude + 1e-8 * size_squared;
+            let variance = angle * angle * amplitude + least;
             for k in [k, k + 1] {
                 self.cov[k * stride + k] += variance;
             }
         }
-        if bias {
-            for q in 0..p {
+        if step.bias {
+            for q in 0..layout.p {
                 let mut sum = 0.0;
                 for &(at, c) in model.outputs.part(q, 0) {
                     sum += c * c * moved[at];
                 }
-                let k = fault + q;
+                let k = layout.fault() + q;
                 self.cov[k * stride + k] += error * sum;
             }
         }
-        // Rows of F P that belong to x.
+    }
+
+    /// `F P F'` but for the turning of the disturbance, in the rows of the plant's state.
+    #[inline(never)]
+    fn propagate(&mut self, step: &Step<'_>, active: usize, scratch: &mut [f64]) {
+        let Step { layout, model, .. } = *step;
+        let (n, stride, gain) = (layout.n, layout.stride(), layout.gain());
+        let width = padded(active);
         for i in 0..n {
             let row = &mut scratch[i * stride..i * stride + width];
             let gains = model.by_gain.row(i).iter();
-            let gains = gains.map(|&(at, b)| (at, b * u[at - gain]));
+            let gains = gains.map(|&(at, b)| (at, b * step.u[at - gain]));
             let terms = model.motion.row(i).iter().copied().chain(gains);
             combine(row, &self.cov, stride, terms);
         }
-        // Their products with F'.
         for i in 0..n {
             let row = &scratch[i * stride..i * stride + width];
             self.cov[i * stride + n..i * stride + width].copy_from_slice(&row[n..]);
@@ -418,51 +434,62 @@ impl Hypothesis {
                 let [a, e, g] = [0, 1, 2].map(|part| model.motion.part(j, part));
                 let mut sum = sparse_dot(a, row) + sparse_dot(e, row) + sparse_dot(g, row);
                 for &(at, b) in model.by_gain.row(j) {
-                    sum += row[at] * b * u[at - gain];
+                    sum += row[at] * b * step.u[at - gain];
                 }
                 self.cov[i * stride + j] = sum;
                 self.cov[j * stride + i] = sum;
             }
-            let k = i * stride + i;
-            self.cov[k] += 1e-12 * settings.start_elsewhere[i] * settings.start_elsewhere[i];
+            let start = step.settings.start_elsewhere[i];
+            self.cov[i * stride + i] += 1e-12 * start * start;
         }
-        // The state.
-        for i in 0..n {
-            let [a, e, g] = [0, 1, 2].map(|part| model.motion.part(i, part));
-            let mut sum = model.state_offset[i]
-                + sparse_dot(g, &self.z)
-                + sparse_dot(a, &self.z)
-                + sparse_dot(e, &self.z);
+    }
+
+    #[inline(never)]
+    fn move_state(&mut self, step: &Step<'_>, scratch: &mut [f64]) {
+        let Step { layout, model, .. } = *step;
+        let next = &mut scratch[..layout.n];
+        for (i, (next, offset)) in next.iter_mut().zip(&model.state_offset).enumerate() {
+            let [a, e, g] = [0, 1, 2].map(|part| sparse_dot(model.motion.part(i, part), &self.z));
+            let mut sum = offset + g + a + e;
             for &(at, b) in model.by_gain.row(i) {
-                sum += b * u[at - gain] * (1.0 + self.z[at]);
+                sum += b * step.u[at - layout.gain()] * (1.0 + self.z[at]);
             }
-            scratch[i] = bounded(sum);
+            *next = bounded(sum);
         }
-        self.z[..n].copy_from_slice(&scratch[..n]);
-        self.rotate(layout, rotation, active);
-        let share = if self.convinced && !settings.trusts_model() {
-            settings.fault_walk
+        self.z[..layout.n].copy_from_slice(next);
+    }
+
+    /// Faults wander.
+    #[inline(never)]
+    fn wander(&mut self, step: &Step<'_>) {
+        if self.accused() == 0 {
+            return;
+        }
+        let (stride, fault) = (step.layout.stride(), step.layout.fault());
+        let share = if self.convinced && !step.settings.trusts_model() {
+            step.settings.fault_walk
         } else {
-            settings.drift_walk
+            step.settings.drift_walk
         };
-        for q in 0..p {
+        for (q, noise) in step.noise.iter().enumerate() {
             let k = fault + q;
             if has(self.additive, q) {
-                self.cov[k * stride + k] += share * share * noise[q] * noise[q];
+                self.cov[k * stride + k] += share * share * noise * noise;
             }
             if has(self.scaled, q) {
                 self.cov[k * stride + k] += 1e-6;
             }
         }
-        self.limit(layout, model, settings, active);
     }
 
     /// The disturbance turns; then what stands below the rows of plant state and disturbance is made
     /// their mirror image.
-    fn rotate(&mut self, layout: Layout, rotation: &[(f64, f64)], active: usize) {
+    #[inline(never)]
+    fn rotate(&mut self, step: &Step<'_>, active: usize) {
+        let layout = step.layout;
         let stride = layout.stride();
         let (first, last) = (layout.n, layout.load());
-        for (h, &(c, s)) in rotation.iter().enumerate() {
+        for (h, &(c, s)) in step.rotation.iter().enumerate() {
             let k = first + 2 * h;
             let (a, b) = (self.z[k], self.z[k + 1]);
             self.z[k] = c * a + s * b;
@@ -499,6 +526,7 @@ impl Hypothesis {
     }
 
     /// Keeps every variance below what is thought possible.
+    #[inline(never)]
     fn limit(&mut self, layout: Layout, model: &ModeModel, settings: &Settings, active: usize) {
         let Layout { n, d, .. } = layout;
         let (stride, load, gain, fault) = (

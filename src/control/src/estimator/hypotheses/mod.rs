@@ -24,7 +24,7 @@ pub use model::Layout;
 use super::super::parameters::Hypotheses;
 use crate::compensation::is_measurement;
 use competition::{Candidates, QUIET};
-use hypothesis::Innovation;
+use hypothesis::{Innovation, Step};
 use linear::dot;
 use model::ModeModel;
 use serde::{Deserialize, Serialize};
@@ -47,6 +47,8 @@ pub struct Bank {
     modes: Vec<ModeModel>,
     settings: Hypotheses,
     rotation: Vec<(f64, f64)>,
+    /// Of each pair of the disturbance: the error of its angle, and the least growth of its variance.
+    waves: Vec<(f64, f64)>,
     prices: Prices,
     /// Noise deviation of each sensor over its threshold (p).
     noise_per_threshold: Vec<f64>,
@@ -414,18 +416,19 @@ impl Bank {
             state.scratch[i] = crate::kernel::bounded(sum);
         }
         state.own.copy_from_slice(&state.scratch[..n]);
+        let step = Step {
+            layout: self.layout,
+            model,
+            settings: &self.settings,
+            noise: &state.noise,
+            rotation: &self.rotation,
+            waves: &self.waves,
+            bias: self.output_error(),
+            u,
+            moved: &state.moved,
+        };
         for slot in state.live.slots() {
-            state.slots[slot].advance(
-                self.layout,
-                model,
-                &self.settings,
-                &state.noise,
-                &self.rotation,
-                self.output_error(),
-                u,
-                &state.moved,
-                &mut state.scratch,
-            );
+            state.slots[slot].advance(&step, &mut state.scratch);
         }
     }
 }

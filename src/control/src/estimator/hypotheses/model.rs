@@ -87,8 +87,6 @@ pub struct ModeModel {
     pub g: Vec<f64>,
     /// Standard deviation of a jump of each load.
     pub load_size: Vec<f64>,
-    /// How far each load wanders per sample.
-    pub load_walk: Vec<f64>,
     /// What jumps of loads may do: all of them at once first, then each source on its own.
     pub jumps: Vec<Jump>,
     /// `C B` (p x m).
@@ -101,6 +99,8 @@ pub struct ModeModel {
     pub motion: Sparse,
     /// `B`, by the gain errors in the joint state.
     pub by_gain: Sparse,
+    /// How the variance of each load and of each gain error grows per sample.
+    pub growth: Vec<f64>,
     /// `C` and `F_d` side by side: the outputs, by entries of the joint state.
     pub outputs: Sparse,
 }
@@ -116,7 +116,7 @@ impl ModeModel {
         e: Vec<f64>,
         f: Vec<f64>,
         point: (&[f64], &[f64], &[f64]),
-        (g, load_size, load_walk): (Vec<f64>, Vec<f64>, Vec<f64>),
+        (g, load_size, growth): (Vec<f64>, Vec<f64>, Vec<f64>),
         bias: Vec<f64>,
         b_inverse: Vec<f64>,
     ) -> Self {
@@ -180,7 +180,7 @@ impl ModeModel {
             output_offset,
             g,
             load_size,
-            load_walk,
+            growth,
             jumps,
             cb,
             bias,

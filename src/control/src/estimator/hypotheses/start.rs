@@ -71,7 +71,8 @@ fn left_inverse(b: &[f64], n: usize, m: usize) -> Vec<f64> {
     out
 }
 
-/// What loads do to the states (n x loads), how large they are, and how far they wander: on each input, each channel of the
+/// What loads do to the states (n x loads), how large they are, and how their variances and those
+/// of the gain errors grow per sample: on each input, each channel of the
 /// disturbance, each state.
 fn loads(
     layout: Layout,
@@ -97,7 +98,9 @@ fn loads(
     }
     let mut walks: Vec<f64> = sizes.iter().map(|size| settings.load_walk * size).collect();
     walks[m..m + s].copy_from_slice(&settings.disturbance_walk);
-    (rows(&effect), sizes, walks)
+    walks.resize(walks.len() + m, settings.gain_walk);
+    let growth = walks.iter().map(|walk| walk * walk).collect();
+    (rows(&effect), sizes, growth)
 }
 
 fn model(
@@ -127,6 +130,16 @@ fn model(
         bias,
         inverse,
     )
+}
+
+/// Per pair of the disturbance's `d` states: the error of its angle, and the least growth of its variance.
+fn waves_of(settings: &Hypotheses, d: usize) -> Vec<(f64, f64)> {
+    let sizes = settings.disturbance_size.iter().step_by(2);
+    let angles = settings.angles.iter().cycle();
+    let pairs = angles.zip(sizes).take(d / 2);
+    pairs
+        .map(|(angle, size)| (settings.period_error * angle, 1e-8 * (size * size)))
+        .collect()
 }
 
 impl Bank {
@@ -159,6 +172,7 @@ impl Bank {
                 .map(|(mode, channels)| model(layout, mode, channels, settings))
                 .collect(),
             rotation: (0..disturbances).flat_map(turn).collect(),
+            waves: waves_of(settings, d),
             prices: Prices {
                 fault: ln(settings.fault_rate),
                 stuck: ln(settings.stuck_rate),
