@@ -3,7 +3,9 @@
 // Matrices are flat and addressed by row and column, as in the equations.
 #![allow(clippy::needless_range_loop)]
 
-use super::linear::{add_row, combine, dot, factor, padded, solve, sparse_dot, subtract_squares};
+use super::linear::{
+    add_row, combine, dot, factor, mirror, padded, solve, sparse_dot, subtract_squares, turn,
+};
 use super::model::{Jump, Layout, ModeModel};
 use crate::kernel::bounded;
 use crate::parameters::Hypotheses as Settings;
@@ -141,7 +143,6 @@ impl Innovation {
         });
         for q in 0..p {
             let row = &mut self.rows[q * stride..q * stride + width];
-            let seen = model.outputs.row(q);
             let output = model.output(q, &h.z, &h.z);
             self.output[q] = output;
             if !has(reading.valid, q) {
@@ -154,7 +155,10 @@ impl Innovation {
             let noise = reading.noise[q];
             let k = fault + q;
             let (scale, slot) = kinds.weights(q, output, h.z[k], bias);
-            let seen = if scale != 0.0 { seen } else { &[] };
+            let seen = match scale != 0.0 {
+                true => model.outputs.row(q),
+                false => &[],
+            };
             let terms = seen.iter().map(|&(at, factor)| (at, scale * factor));
             combine(row, &h.cov, stride, terms);
             if slot != 0.0 {
@@ -173,9 +177,8 @@ impl Innovation {
                 *sum = 0.0;
                 if has(reading.valid, j) {
                     if scale != 0.0 {
-                        *sum = scale
-                            * (sparse_dot(model.outputs.part(j, 0), row)
-                                + sparse_dot(model.outputs.part(j, 1), row));
+                        let [states, waves] = model.outputs.parts(j);
+                        *sum = scale * (sparse_dot(states, row) + sparse_dot(waves, row));
                     }
                     if slot != 0.0 {
                         *sum += slot * row[fault + j];
@@ -353,12 +356,11 @@ impl Hypothesis {
         self.move_state(step, scratch);
         self.rotate(step, active);
         self.wander(step);
-        self.limit(step.layout, step.model, step.settings, active);
+        self.limit(step, active);
     }
 
     /// The model's error acts as a load that moves as the state and the input move; loads, gain errors
     /// and the disturbance wander.
-    #[inline(never)]
     fn drift(&mut self, step: &Step<'_>, scratch: &mut [f64]) {
         let Step {
             layout,
@@ -382,7 +384,7 @@ impl Hypothesis {
         let from = load + layout.state_load();
         for (i, k) in (from..gain).enumerate() {
             let mut sum = 0.0;
-            for &(at, a) in model.motion.part(i, 0) {
+            for &(at, a) in &model.motion.parts(i)[0] {
                 sum += a * a * moved[at];
             }
             for &(at, b) in model.by_gain.row(i) {
@@ -405,7 +407,7 @@ impl Hypothesis {
         if step.bias {
             for q in 0..layout.p {
                 let mut sum = 0.0;
-                for &(at, c) in model.outputs.part(q, 0) {
+                for &(at, c) in &model.outputs.parts(q)[0] {
                     sum += c * c * moved[at];
                 }
                 let k = layout.fault() + q;
@@ -415,7 +417,6 @@ impl Hypothesis {
     }
 
     /// `F P F'` but for the turning of the disturbance, in the rows of the plant's state.
-    #[inline(never)]
     fn propagate(&mut self, step: &Step<'_>, active: usize, scratch: &mut [f64]) {
         let Step { layout, model, .. } = *step;
         let (n, stride, gain) = (layout.n, layout.stride(), layout.gain());
@@ -427,29 +428,32 @@ impl Hypothesis {
             let terms = model.motion.row(i).iter().copied().chain(gains);
             combine(row, &self.cov, stride, terms);
         }
-        for i in 0..n {
-            let row = &scratch[i * stride..i * stride + width];
-            self.cov[i * stride + n..i * stride + width].copy_from_slice(&row[n..]);
-            for j in 0..=i {
-                let [a, e, g] = [0, 1, 2].map(|part| model.motion.part(j, part));
+        let rows = scratch.chunks_exact(stride).take(n);
+        for (i, row) in rows.clone().enumerate() {
+            self.cov[i * stride + n..i * stride + width].copy_from_slice(&row[n..width]);
+        }
+        for j in 0..n {
+            let ([a, e, g], gains) = (model.motion.parts(j), model.by_gain.row(j));
+            for (i, row) in rows.clone().enumerate().skip(j) {
                 let mut sum = sparse_dot(a, row) + sparse_dot(e, row) + sparse_dot(g, row);
-                for &(at, b) in model.by_gain.row(j) {
+                for &(at, b) in gains {
                     sum += row[at] * b * step.u[at - gain];
                 }
                 self.cov[i * stride + j] = sum;
                 self.cov[j * stride + i] = sum;
             }
-            let start = step.settings.start_elsewhere[i];
-            self.cov[i * stride + i] += 1e-12 * start * start;
+            let start = step.settings.start_elsewhere[j];
+            self.cov[j * stride + j] += 1e-12 * start * start;
         }
     }
 
-    #[inline(never)]
+    /// The next state of the plant.
     fn move_state(&mut self, step: &Step<'_>, scratch: &mut [f64]) {
         let Step { layout, model, .. } = *step;
         let next = &mut scratch[..layout.n];
         for (i, (next, offset)) in next.iter_mut().zip(&model.state_offset).enumerate() {
-            let [a, e, g] = [0, 1, 2].map(|part| sparse_dot(model.motion.part(i, part), &self.z));
+            let [a, e, g] = model.motion.parts(i).each_ref();
+            let [a, e, g] = [a, e, g].map(|part| sparse_dot(part, &self.z));
             let mut sum = offset + g + a + e;
             for &(at, b) in model.by_gain.row(i) {
                 sum += b * step.u[at - layout.gain()] * (1.0 + self.z[at]);
@@ -460,7 +464,6 @@ impl Hypothesis {
     }
 
     /// Faults wander.
-    #[inline(never)]
     fn wander(&mut self, step: &Step<'_>) {
         if self.accused() == 0 {
             return;
@@ -484,7 +487,6 @@ impl Hypothesis {
 
     /// The disturbance turns; then what stands below the rows of plant state and disturbance is made
     /// their mirror image.
-    #[inline(never)]
     fn rotate(&mut self, step: &Step<'_>, active: usize) {
         let layout = step.layout;
         let stride = layout.stride();
@@ -495,89 +497,69 @@ impl Hypothesis {
             self.z[k] = c * a + s * b;
             self.z[k + 1] = c * b - s * a;
             let (above, below) = self.cov.split_at_mut((k + 1) * stride);
-            let rows = above[k * stride..].iter_mut().zip(&mut below[..stride]);
-            for (a, b) in rows {
-                let (x, y) = (*a, *b);
-                *a = c * x + s * y;
-                *b = c * y - s * x;
-            }
+            turn((c, s), &mut above[k * stride..], &mut below[..stride]);
             for row in self.cov.chunks_exact_mut(stride).take(last) {
-                let pair = &mut row[k..k + 2];
-                let (x, y) = (pair[0], pair[1]);
-                pair[0] = c * x + s * y;
-                pair[1] = c * y - s * x;
+                if let [x, y] = &mut row[k..k + 2] {
+                    (*x, *y) = (c * *x + s * *y, c * *y - s * *x);
+                }
             }
             let mean = 0.5 * (self.cov[k * stride + k + 1] + self.cov[(k + 1) * stride + k]);
             self.cov[k * stride + k + 1] = mean;
             self.cov[(k + 1) * stride + k] = mean;
         }
-        let (above, below) = self.cov.split_at_mut(last * stride);
-        for (i, row) in above.chunks_exact(stride).enumerate() {
-            for (target, &value) in below.chunks_exact_mut(stride).zip(&row[last..active]) {
-                target[i] = value;
-            }
-        }
-        let (above, below) = self.cov.split_at_mut(first * stride);
-        for (i, row) in above.chunks_exact(stride).enumerate() {
-            for (target, &value) in below.chunks_exact_mut(stride).zip(&row[first..last]) {
-                target[i] = value;
-            }
-        }
+        mirror(&mut self.cov, stride, last, active, last);
+        mirror(&mut self.cov, stride, first, last, first);
     }
 
     /// Keeps every variance below what is thought possible.
-    #[inline(never)]
-    fn limit(&mut self, layout: Layout, model: &ModeModel, settings: &Settings, active: usize) {
-        let Layout { n, d, .. } = layout;
-        let (stride, load, gain, fault) = (
-            layout.stride(),
-            layout.load(),
-            layout.gain(),
-            layout.fault(),
-        );
-        for k in 0..active {
-            let most = if k < n {
-                1e8 * settings.start_elsewhere[k] * settings.start_elsewhere[k]
-            } else if k < n + d {
-                settings.disturbance_size[k - n] * settings.disturbance_size[k - n]
-            } else if k < gain {
-                let size = model.load_size[k - load];
-                4.0 * (size * size).max(self.z[k] * self.z[k])
-            } else if k < fault {
-                settings.gain_error * settings.gain_error
-            } else if has(self.accused(), k - fault) {
-                2.0 * settings.fault_size[k - fault] * settings.fault_size[k - fault]
+    fn limit(&mut self, step: &Step<'_>, active: usize) {
+        let Step { layout, model, .. } = *step;
+        let (load, gain, fault) = (layout.load(), layout.gain(), layout.fault());
+        for (k, &most) in model.most[..fault].iter().enumerate() {
+            let most = if (load..gain).contains(&k) {
+                4.0 * most.max(self.z[k] * self.z[k])
             } else {
-                model.bias[k - fault] * settings.model_error * settings.model_error
+                most
             };
-            let variance = self.cov[k * stride + k];
-            if (0.0..=most).contains(&variance) {
-                continue;
-            }
-            if variance.is_nan() || variance < 0.0 {
-                // Cancellation has spoilt it: start anew.
-                let fresh = if k < n {
-                    settings.start_elsewhere[k] * settings.start_elsewhere[k]
-                } else {
-                    most
-                };
-                let mean = self.z[k];
-                self.open(k, mean, fresh);
-                continue;
-            }
-            let scale = if variance.is_finite() {
-                libm::sqrt(most / variance)
-            } else {
-                0.0
-            };
-            for j in 0..active {
-                let v = self.cov[k * stride + j] * scale;
-                let v = if v.is_finite() { v } else { 0.0 };
-                self.cov[k * stride + j] = v;
-                self.cov[j * stride + k] = v;
-            }
-            self.cov[k * stride + k] = most;
+            self.keep_below(step, active, k, most);
         }
+        for k in fault..active {
+            let size = step.settings.fault_size[k - fault];
+            let most = match has(self.accused(), k - fault) {
+                true => 2.0 * size * size,
+                false => model.most[k],
+            };
+            self.keep_below(step, active, k, most);
+        }
+    }
+
+    #[inline]
+    fn keep_below(&mut self, step: &Step<'_>, active: usize, k: usize, most: f64) {
+        let stride = step.layout.stride();
+        let variance = self.cov[k * stride + k];
+        if (0.0..=most).contains(&variance) {
+            return;
+        }
+        if variance.is_nan() || variance < 0.0 {
+            // Cancellation has spoilt it: start anew.
+            let start = step.settings.start_elsewhere.get(k);
+            let fresh = start.map_or(most, |start| start * start);
+            self.open(k, self.z[k], fresh);
+            return;
+        }
+        let scale = if variance.is_finite() {
+            libm::sqrt(most / variance)
+        } else {
+            0.0
+        };
+        for v in &mut self.cov[k * stride..k * stride + active] {
+            let scaled = *v * scale;
+            *v = if scaled.is_finite() { scaled } else { 0.0 };
+        }
+        for j in 0..active {
+            self.cov[j * stride + k] = self.cov[k * stride + j];
+        }
+        self.cov[k * stride + k] = most;
     }
 
     /// Loads jump, and input gains with them, with effect on the state at once.

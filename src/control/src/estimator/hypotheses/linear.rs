@@ -13,50 +13,42 @@ pub const fn padded(entries: usize) -> usize {
     entries.next_multiple_of(LANES)
 }
 
-/// The entries other than zero of matrices that stand side by side, row after row.
+/// Columns and values of a row's entries other than zero.
+pub type Entries = Vec<(usize, f64)>;
+
+/// The entries other than zero of matrices that stand side by side.
 #[derive(Clone, Debug)]
-pub struct Sparse {
-    parts: usize,
-    /// Where each part of each row begins among the entries, and where the last one ends.
-    starts: Vec<usize>,
-    /// Column and value.
-    entries: Vec<(usize, f64)>,
+pub struct Sparse<const PARTS: usize> {
+    /// Of each row all of them, then those of each matrix.
+    rows: Vec<(Entries, [Entries; PARTS])>,
 }
 
-impl Sparse {
-    /// From parts given row after row, each with the column at which it begins; `rows` of them.
-    pub fn new<const PARTS: usize>(rows: usize, parts: [(usize, &[f64]); PARTS]) -> Self {
-        let mut starts = Vec::new();
-        let mut entries = Vec::new();
-        for row in 0..rows {
-            for (from, matrix) in parts {
-                starts.push(entries.len());
-                let width = matrix.len() / rows.max(1);
-                let columns = (from..).zip(&matrix[row * width..(row + 1) * width]);
-                entries.extend(
-                    columns
-                        .filter(|(_, value)| **value != 0.0)
-                        .map(|(at, &value)| (at, value)),
-                );
-            }
-        }
-        starts.push(entries.len());
+impl<const PARTS: usize> Sparse<PARTS> {
+    /// From matrices of so many `rows`, row after row, each with the column at which it begins.
+    pub fn new(rows: usize, parts: [(usize, &[f64]); PARTS]) -> Self {
+        let row = |row: usize| {
+            let each = parts.map(|(from, matrix)| {
+                let width = matrix.len() / rows;
+                let entries = (from..).zip(matrix[row * width..(row + 1) * width].iter().copied());
+                entries
+                    .filter(|(_, value)| *value != 0.0)
+                    .collect::<Entries>()
+            });
+            (each.iter().flatten().copied().collect(), each)
+        };
         Self {
-            parts: PARTS,
-            starts,
-            entries,
+            rows: (0..rows).map(row).collect(),
         }
     }
 
-    /// All parts of a row.
+    /// The entries of a row.
     pub fn row(&self, row: usize) -> &[(usize, f64)] {
-        &self.entries[self.starts[row * self.parts]..self.starts[(row + 1) * self.parts]]
+        &self.rows[row].0
     }
 
-    /// One part of a row.
-    pub fn part(&self, row: usize, part: usize) -> &[(usize, f64)] {
-        let at = row * self.parts + part;
-        &self.entries[self.starts[at]..self.starts[at + 1]]
+    /// The entries of a row, matrix by matrix.
+    pub fn parts(&self, row: usize) -> &[Entries; PARTS] {
+        &self.rows[row].1
     }
 }
 
@@ -141,17 +133,59 @@ pub fn subtract_squares(
     width: usize,
 ) {
     blocks!(width, |from, W| {
-        for (k, target) in matrix.chunks_exact_mut(stride).take(count).enumerate() {
-            let Some(target) = target[from..].first_chunk_mut::<W>() else {
+        let targets = |matrix: &mut [f64], rows: &[f64]| {
+            let (left, right) = rows.split_at(stride);
+            let Some(a) = left[from..].first_chunk::<W>() else {
                 return;
             };
-            for row in rows.chunks_exact(stride) {
-                if let Some(values) = row[from..].first_chunk::<W>() {
-                    add(target, -row[k], values);
+            // Two rows at a time: the entries of the matrix are loaded and stored half as often.
+            let b = right.get(from..).and_then(|right| right.first_chunk::<W>());
+            let targets = matrix.chunks_exact_mut(stride).take(count).zip(left);
+            if let Some(b) = b {
+                for ((target, l), r) in targets.zip(right) {
+                    if let Some(target) = target[from..].first_chunk_mut::<W>() {
+                        add(target, -l, a);
+                        add(target, -r, b);
+                    }
+                }
+            } else {
+                for (target, l) in targets {
+                    if let Some(target) = target[from..].first_chunk_mut::<W>() {
+                        add(target, -l, a);
+                    }
+                }
+            }
+        };
+        rows.chunks(2 * stride)
+            .for_each(|rows| targets(matrix, rows));
+    });
+}
+
+/// Rows `from..until` of a symmetric matrix get their first `columns` entries from the rows above, which
+/// are padded to `stride`; `columns` are at most `from`.
+pub fn mirror(matrix: &mut [f64], stride: usize, from: usize, until: usize, columns: usize) {
+    let (above, below) = matrix.split_at_mut(from * stride);
+    let above = above.chunks_exact(stride).take(columns);
+    let mut at = from;
+    for rows in below[..(until - from) * stride].chunks_mut(LANES * stride) {
+        if rows.len() == LANES * stride {
+            let (first, last) = rows.split_at_mut(2 * stride);
+            let ((a, b), (c, d)) = (first.split_at_mut(stride), last.split_at_mut(stride));
+            let four = a.iter_mut().zip(b).zip(c.iter_mut().zip(d));
+            for (((a, b), (c, d)), source) in four.zip(above.clone()) {
+                if let Some(&[w, x, y, z]) = source[at..].first_chunk::<LANES>() {
+                    (*a, *b, *c, *d) = (w, x, y, z);
+                }
+            }
+        } else {
+            for (at, row) in (at..).zip(rows.chunks_exact_mut(stride)) {
+                for (to, source) in row.iter_mut().zip(above.clone()) {
+                    *to = source[at];
                 }
             }
         }
-    });
+        at += LANES;
+    }
 }
 
 #[inline(always)]
@@ -198,6 +232,22 @@ pub fn axpy(out: &mut [f64], factor: f64, vector: &[f64]) {
     for (o, &v) in out.iter_mut().zip(vector) {
         *o += factor * v;
     }
+}
+
+/// `(c x + s y, c y - s x)`, entry by entry of padded rows.
+#[inline]
+pub fn turn((c, s): (f64, f64), left: &mut [f64], right: &mut [f64]) {
+    blocks!(left.len(), |from, W| {
+        if let Some(left) = left[from..].first_chunk_mut::<W>()
+            && let Some(right) = right[from..].first_chunk_mut::<W>()
+        {
+            for (left, right) in left.iter_mut().zip(right) {
+                let (x, y) = (*left, *right);
+                *left = c * x + s * y;
+                *right = c * y - s * x;
+            }
+        }
+    });
 }
 
 /// Inner product.
@@ -278,6 +328,19 @@ mod tests {
         }
 
         #[test]
+        fn rows_get_their_first_entries_from_the_rows_above(entries in 1usize..30, from in 0usize..30) {
+            let (from, stride) = (from.min(entries), padded(entries));
+            let before: Vec<f64> = (0..entries * stride).map(|at| at as f64).collect();
+            let mut after = before.clone();
+            mirror(&mut after, stride, from, entries, from);
+            for (at, value) in after.iter().enumerate() {
+                let (row, column) = (at / stride, at % stride);
+                let mirrored = row >= from && column < from;
+                prop_assert_eq!(*value, before[if mirrored { column * stride + row } else { at }]);
+            }
+        }
+
+        #[test]
         fn the_factor_times_its_transpose_is_the_matrix(p in 1usize..6, entries in prop::collection::vec(-1.0..1.0f64, 25)) {
             let square = |i: usize, j: usize| (0..p).map(|k| entries[5 * i + k] * entries[5 * j + k]).sum::<f64>() + f64::from(i == j);
             let mut s: Vec<f64> = (0..p * p).map(|at| square(at / p, at % p)).collect();
@@ -296,12 +359,11 @@ mod tests {
         let both = Sparse::new(2, [(0, &[0.0, 2.0, 3.0, 0.0]), (5, &[0.0, 4.0])]);
         assert_eq!(both.row(0), [(1, 2.0)]);
         assert_eq!(both.row(1), [(0, 3.0), (5, 4.0)]);
-        assert_eq!(both.part(1, 1), [(5, 4.0)]);
+        assert_eq!(both.parts(1)[1], [(5, 4.0)]);
         assert_eq!(
             sparse_dot(both.row(1), &[1.0, 0.0, 0.0, 0.0, 0.0, 0.5]),
             5.0
         );
-        let none = Sparse::new(0, [(0, &[])]);
-        assert!(none.entries.is_empty());
+        assert!(Sparse::new(0, [(0, &[])]).rows.is_empty());
     }
 }

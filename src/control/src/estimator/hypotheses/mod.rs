@@ -287,7 +287,7 @@ impl Bank {
         for (q, ((output, spread), noise)) in outputs.zip(reading.noise).enumerate() {
             *output = model.output(q, &state.own, z);
             let mut variance = noise * noise;
-            for &(k, c) in model.outputs.part(q, 0) {
+            for &(k, c) in &model.outputs.parts(q)[0] {
                 variance += c * c * self.own_variance(model, &state.own, k);
             }
             *spread = variance;
@@ -409,9 +409,10 @@ impl Bank {
         let Layout { n, m, .. } = self.layout;
         let z = &state.slots[state.best].z;
         for i in 0..n {
+            let [own, waves, _] = model.motion.parts(i);
             let mut sum = model.state_offset[i]
-                + linear::sparse_dot(model.motion.part(i, 0), &state.own)
-                + linear::sparse_dot(model.motion.part(i, 1), z);
+                + linear::sparse_dot(own, &state.own)
+                + linear::sparse_dot(waves, z);
             sum += dot(&model.b[i * m..(i + 1) * m], u);
             state.scratch[i] = crate::kernel::bounded(sum);
         }

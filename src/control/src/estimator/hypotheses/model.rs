@@ -96,13 +96,16 @@ pub struct ModeModel {
     /// `B^+` (m x n): the input that would act as a load does.
     pub b_inverse: Vec<f64>,
     /// `A`, `E_d` and `G` side by side: what moves the state, by entries of the joint state.
-    pub motion: Sparse,
+    pub motion: Sparse<3>,
     /// `B`, by the gain errors in the joint state.
-    pub by_gain: Sparse,
+    pub by_gain: Sparse<1>,
     /// How the variance of each load and of each gain error grows per sample.
     pub growth: Vec<f64>,
+    /// The greatest variance of each entry of the joint state: of a load the square of its size, of a
+    /// fault that of a healthy sensor.
+    pub most: Vec<f64>,
     /// `C` and `F_d` side by side: the outputs, by entries of the joint state.
-    pub outputs: Sparse,
+    pub outputs: Sparse<2>,
 }
 
 impl ModeModel {
@@ -117,7 +120,7 @@ impl ModeModel {
         f: Vec<f64>,
         point: (&[f64], &[f64], &[f64]),
         (g, load_size, growth): (Vec<f64>, Vec<f64>, Vec<f64>),
-        bias: Vec<f64>,
+        (bias, most): (Vec<f64>, Vec<f64>),
         b_inverse: Vec<f64>,
     ) -> Self {
         let Layout { n, m, p, .. } = layout;
@@ -181,6 +184,7 @@ impl ModeModel {
             g,
             load_size,
             growth,
+            most,
             jumps,
             cb,
             bias,
@@ -192,9 +196,9 @@ impl ModeModel {
     }
 
     /// Output `q` at the plant's state `x` (n) and the disturbance in `z`.
+    #[inline]
     pub fn output(&self, q: usize, x: &[f64], z: &[f64]) -> f64 {
-        self.output_offset[q]
-            + sparse_dot(self.outputs.part(q, 0), x)
-            + sparse_dot(self.outputs.part(q, 1), z)
+        let [states, waves] = self.outputs.parts(q);
+        self.output_offset[q] + sparse_dot(states, x) + sparse_dot(waves, z)
     }
 }

@@ -115,8 +115,18 @@ fn model(
         let parts = row.iter().zip(&settings.state_size);
         0.25 * parts.map(|(c, size)| (c * size) * (c * size)).sum::<f64>()
     };
-    let bias = c.chunks_exact(n).map(spread).collect();
+    let bias: Vec<f64> = c.chunks_exact(n).map(spread).collect();
     let inverse = left_inverse(&b, n, m);
+    let loads = loads(layout, mode, channels, settings);
+    let error = settings.model_error;
+    let starts = settings.start_elsewhere.iter();
+    let most = starts
+        .map(|size| 1e8 * size * size)
+        .chain(settings.disturbance_size.iter().map(|size| size * size))
+        .chain(loads.1.iter().map(|size| size * size))
+        .chain((0..m).map(|_| settings.gain_error * settings.gain_error))
+        .chain(bias.iter().map(|bias| bias * error * error))
+        .collect();
     let harmonics = settings.angles.len();
     ModeModel::new(
         layout,
@@ -126,8 +136,8 @@ fn model(
         waves(&channels.e, harmonics),
         waves(&channels.f, harmonics),
         (&mode.x0, &mode.u0, &mode.y0),
-        loads(layout, mode, channels, settings),
-        bias,
+        loads,
+        (bias, most),
         inverse,
     )
 }
