@@ -146,19 +146,17 @@ fn switches_far_enough_apart_leave_the_command_where_it_was() {
 #[test]
 fn resets_more_often_than_proved_are_refused() {
     let design = assemble(request(Lyapunov::Common, true)).unwrap();
-    ftc_design::coverage::check(&design).unwrap();
-    let plant = &design.plant;
-    design.synthesis.as_ref().unwrap().verify(plant).unwrap();
+    ftc_design::coverage::prove(&design).unwrap();
 
     let mut hasty = design.clone();
     hasty.controller.feedback.transfer.as_mut().unwrap().samples = 1;
-    let sentence = ftc_design::coverage::check(&hasty).unwrap_err().to_string();
+    let sentence = ftc_design::coverage::prove(&hasty).unwrap_err().to_string();
     assert!(sentence.contains("bumpless"), "{sentence}");
-    let synthesis = hasty.synthesis.as_mut().unwrap();
-    synthesis.running_loop.transfer.as_mut().unwrap().samples = 1;
-    assert!(synthesis.verify(plant).is_err());
+    let proof = &mut hasty.proof.as_mut().unwrap().running_loop;
+    proof.transfer.as_mut().unwrap().mu = 1.0;
+    assert!(ftc_design::coverage::prove(&hasty).is_err());
 
     let mut unproved = design;
-    unproved.synthesis.as_mut().unwrap().running_loop.transfer = None;
-    assert!(ftc_design::coverage::check(&unproved).is_err());
+    unproved.proof.as_mut().unwrap().running_loop.transfer = None;
+    assert!(ftc_design::coverage::prove(&unproved).is_err());
 }

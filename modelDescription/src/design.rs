@@ -6,6 +6,18 @@ use ftc_design::{Design, Signal};
 /// Name of the design in an FMU's `resources` folder.
 pub const DESIGN_FILE: &str = "design.json";
 
+/// The bytes of [`DESIGN_FILE`]: what the binaries read of a design, which is all but its proof.
+///
+/// # Errors
+/// What the writer says.
+pub fn write_design(design: &Design) -> Result<Vec<u8>, String> {
+    let running = Design {
+        proof: None,
+        ..design.clone()
+    };
+    serde_json::to_vec(&running).map_err(|why| why.to_string())
+}
+
 /// Reads the bytes of [`DESIGN_FILE`] and checks that all sizes agree.
 ///
 /// # Errors

@@ -201,7 +201,6 @@ pub fn controller_design(channel: Channel, noise: f64) -> ControllerDesign {
             largest_fault: vec![1e6; 2],
         },
         compensation: Compensation::VirtualSensor,
-        input_limits: vec![Limits::default(); 2],
     }
 }
 
@@ -216,7 +215,7 @@ pub fn controller(channel: Channel, noise: f64) -> ControllerParameters {
         observer: design.observer,
         estimator: design.estimator,
         compensation: design.compensation,
-        input_limits: design.input_limits,
+        input_limits: vec![Limits::default(); 2],
     }
 }
 

@@ -13,13 +13,15 @@ if TYPE_CHECKING:
     from pathlib import Path
 
 RESOURCE = "resources/design.json"
+CERTIFICATE = "resources/certificate.json"
 
 
 def load(path: Path) -> dict:
     """Returns the record in a `.json` file, or the one zipped into an FMU."""
     if path.suffix == ".fmu":
         with zipfile.ZipFile(path) as archive:
-            return json.loads(archive.read(RESOURCE))
+            design = json.loads(archive.read(RESOURCE))
+            return design | {"proof": json.loads(archive.read(CERTIFICATE))["proof"]}
     return json.loads(path.read_text())
 
 

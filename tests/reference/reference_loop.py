@@ -339,7 +339,7 @@ class Loop:
 
     def saturate(self, u: np.ndarray) -> np.ndarray:
         """Clamps a command to the input limits."""
-        limits = self.design["controller"]["input_limits"]
+        limits = self.design["signals"]["inputs"]
         low = [-math.inf if entry["min"] is None else entry["min"] for entry in limits]
         high = [math.inf if entry["max"] is None else entry["max"] for entry in limits]
         return np.clip(u, low, high)

@@ -135,7 +135,7 @@ def channels(design: dict, index: int, lost: dict | None = None, *, exact: bool 
             L @ (y - C @ estimate) if len(injection) else whole[:0],
         ]
     )
-    spec = design["synthesis"]["state_feedback"]["spec"]
+    spec = design["proof"]["state_feedback"]
     weight = np.concatenate(
         [spec["integral_weight"], *[np.repeat(spec["integral_weight"], 2)] * len(feedback["resonators"])]
     )

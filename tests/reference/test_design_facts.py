@@ -172,7 +172,7 @@ def _least_eigenvalue(block: np.ndarray) -> float:
 
 def test_state_feedback_certificate(finished: Finished) -> None:
     """Every inequality (T2) of the shipped gains is positive definite with the shipped S = L M L'."""
-    proved = finished.record["synthesis"]["state_feedback"]
+    proved = finished.record["proof"]["state_feedback"]
     units = proved["certificate"]["units"]
     ((basis, S),) = ((np.array(f["basis"]), np.array(f["core"])) for f in proved["certificate"]["lyapunov"])
     latency = finished.record["controller"]["feedback"]["latency"]
@@ -198,7 +198,7 @@ def test_state_feedback_certificate(finished: Finished) -> None:
 def test_observer_certificate(finished: Finished) -> None:
     """On every switch the estimation error shrinks in the shipped P: beta^2 P - F' P F is positive definite."""
     observer = finished.record["controller"]["observer"]
-    certificate = finished.record["synthesis"]["observer"]["certificate"]
+    certificate = finished.record["proof"]["observer"]["certificate"]
     units = np.array(certificate["states"])
     (P,) = (np.array(P) / np.outer(units, units) for P in certificate["lyapunov"])
     beta = finished.request["observer"]["decay"]

@@ -73,7 +73,7 @@ def example(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFac
 
 def test_gains_of_the_running_loop(example: dict) -> None:
     """gamma_loop of every mode."""
-    for index, level in enumerate(example["synthesis"]["running_loop"]["gamma_loop"]):
+    for index, level in enumerate(example["proof"]["running_loop"]["gamma_loop"]):
         P = rationals(storage(channels(example, index).disturbance, level * (1 - 1e-5)))
         exact = channels(example, index, exact=True).disturbance
         assert positive_definite(P)
@@ -101,10 +101,10 @@ def error_maps(design: dict, lost: dict, exact: bool) -> list[np.ndarray]:  # no
 def test_observers_without_sensors(example: dict) -> None:
     """One function shrinks under every mode and every served set, where sets may change at each sample."""
     observer = example["controller"]["observer"]
-    proof = example["synthesis"]["observer"]["lost"]
+    proof = example["proof"]["observer"]["lost"]
     if observer["minimum_dwell"] > 0 or not observer["lost"]:
         return
-    units = np.array(example["synthesis"]["observer"]["certificate"]["states"])
+    units = np.array(example["proof"]["observer"]["certificate"]["states"])
     P = rationals(np.array(proof["lyapunov"][0][0]) / np.outer(units, units))
     assert positive_definite(P)
     shrink = Fraction(proof["decay"]) ** 2

@@ -68,7 +68,7 @@ def random_design(seed: int) -> dict:
 def check_claims(design: dict) -> list[float]:
     """Holds every claim about the running loop against the loop; returns claimed over computed."""
     modes = design["plant"]["modes"]
-    claims = design["synthesis"]["running_loop"]
+    claims = design["proof"]["running_loop"]
     ratios = []
     for index in range(len(modes)):
         loop = channels(design, index)
@@ -79,7 +79,7 @@ def check_claims(design: dict) -> list[float]:
             (claims["gamma_loop"][index], loop.disturbance.l2_gain()),
         ]
         ratios += [claimed / max(computed, 1e-8) for claimed, computed in pairs if claimed > 1e-7]
-        noise = design["synthesis"]["observer"]["spec"]["noise"]
+        noise = design["proof"]["observer"]["spec"]["noise"]
         if noise:
             system = loop.command_from_sensors
             spread = running_loop.System(system.A, system.B * noise, system.C, system.D * noise)
@@ -96,7 +96,7 @@ def check_claims(design: dict) -> list[float]:
 def check_table(design: dict) -> int:
     """Holds the table of lost sensors against the plant and the loops; returns how many sets are served."""
     plant = design["plant"]
-    table = design["synthesis"]["running_loop"]["lost"]
+    table = design["proof"]["running_loop"]["lost"]
     served = {tuple(entry["sensors"]): entry for entry in design["controller"]["observer"]["lost"]}
     p = len(plant["modes"][0]["c"])
     sets = [(k,) for k in range(p)] + list(combinations(range(p), 2)) + [tuple(range(p))]
@@ -134,7 +134,7 @@ def test_examples_serve_what_they_say(example: dict) -> None:
     stable = all(np.abs(np.linalg.eigvals(mode["a"])).max() < 1 for mode in example["plant"]["modes"])
     served = check_table(example)
     if stable:
-        assert served == len(example["synthesis"]["running_loop"]["lost"])
+        assert served == len(example["proof"]["running_loop"]["lost"])
 
 
 def simulate(design: dict, lost: dict | None, switching: np.ndarray, sets: np.ndarray | None = None) -> float:
@@ -157,7 +157,7 @@ def simulate(design: dict, lost: dict | None, switching: np.ndarray, sets: np.nd
 
 def check_runs(design: dict) -> None:
     """No simulated disturbance exceeds a claim; with sensors lost a run stays bounded where that is proved."""
-    claims, modes = design["synthesis"]["running_loop"], len(design["plant"]["modes"])
+    claims, modes = design["proof"]["running_loop"], len(design["plant"]["modes"])
     for mode in range(modes):
         assert simulate(design, None, np.full(400, mode)) <= claims["gamma_loop"][mode]
     rng = np.random.default_rng(5)
@@ -168,7 +168,7 @@ def check_runs(design: dict) -> None:
         row = next(row for row in claims["lost"] if row["sensors"] == lost["sensors"])
         for mode in range(modes):
             assert simulate(design, lost, np.full(400, mode)) <= row["gamma_loop"][mode]
-        arbitrary = design["synthesis"]["state_feedback"]["spec"]["lyapunov"] != "dwell"
+        arbitrary = design["proof"]["state_feedback"]["lyapunov"] != "dwell"
         # Only a Kalman filter's state is that of the observers without sensors.
         if arbitrary and observer["kind"] == "kalman" and observer["minimum_dwell"] == 0:
             sets = rng.integers(0, 2, 600).astype(bool)

@@ -9,7 +9,7 @@ use ftc_design::{Design, FORMAT, Signal, Signals};
 use ftc_plant::TruePlant;
 use ftc_simulate::PlantSimulator;
 use ftc_simulate::plant::External;
-use model_description::{CONTROLLER, Interface, PLANT, VariableTable};
+use model_description::{CONTROLLER, DESIGN_FILE, Interface, PLANT, VariableTable};
 use std::path::Path;
 use tempfile::TempDir;
 
@@ -37,8 +37,8 @@ impl Model {
 
     fn unpacked(design: &Design, identifier: &str, table: fn(&Interface) -> VariableTable) -> Self {
         let folder = tempfile::tempdir().expect("a folder for the resources");
-        let bytes = serde_json::to_vec(design).expect("a design is plain data");
-        std::fs::write(folder.path().join("design.json"), &bytes).expect("the folder is writable");
+        let bytes = model_description::write_design(design).expect("a design is plain data");
+        std::fs::write(folder.path().join(DESIGN_FILE), &bytes).expect("the folder is writable");
         Self {
             folder,
             guid: model_description::guid(identifier, &bytes),
@@ -83,7 +83,7 @@ pub fn example() -> Design {
         plant: common::plant(Channel::State),
         controller,
         true_plant: TruePlant::default(),
-        synthesis: None,
+        proof: None,
     }
 }
 

@@ -218,7 +218,7 @@ pub fn assemble_with(request: Request, run: &Run) -> Result<Design, Failure> {
     {
         return Err(DesignError::from(RequestError::Bumpless).into());
     }
-    let input_limits = limits(&request.signals.inputs);
+    let input_limits = request.signals.input_limits();
     let feedback = feedback(
         &synthesis.state_feedback,
         &request.plant,
@@ -236,11 +236,10 @@ pub fn assemble_with(request: Request, run: &Run) -> Result<Design, Failure> {
             observer: synthesis.observer.observer.clone(),
             estimator,
             compensation: request.compensation,
-            input_limits,
         },
         true_plant: request.true_plant,
         scenario: request.scenario,
-        synthesis: Some(synthesis),
+        proof: Some(synthesis.into()),
     })
 }
 
@@ -257,14 +256,6 @@ fn observer_noise(request: &Request) -> Vec<f64> {
         .collect()
 }
 
-fn limits(inputs: &[Signal]) -> Vec<Limits> {
-    let of = |input: &Signal| Limits {
-        min: input.min,
-        max: input.max,
-    };
-    inputs.iter().map(of).collect()
-}
-
 /// The certified gains as the controller runs them, with or without reference feedforward. What saturation takes off an input unwinds
 /// the integral by half of what would undo it; inputs without a limit never saturate.
 pub fn feedback(
@@ -276,7 +267,7 @@ pub fn feedback(
 ) -> StateFeedback {
     let mut feedback = control.for_controller(plant);
     feedback.transfer = transfer.map(|proved| Transfer {
-        samples: proved.samples,
+        samples: proved.samples(),
         decay: TRANSFER_DECAY,
     });
     if feedforward {

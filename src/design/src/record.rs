@@ -1,6 +1,6 @@
 //! The design as a record: plain data, everything the exporter ships and the FMUs read.
 
-use super::Synthesis;
+use super::Proof;
 use super::matrices::mode_models;
 use ftc_control::parameters::{
     Compensation, Estimator, EstimatorMethod, Limits, Observer, StateFeedback,
@@ -14,7 +14,7 @@ use ftc_plant::{Scenario, TruePlant};
 use serde::{Deserialize, Serialize};
 
 /// Version of the record's layout; an FMU refuses a record of another.
-pub const FORMAT: u32 = 3;
+pub const FORMAT: u32 = 4;
 
 /// A finished design.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -35,11 +35,11 @@ pub struct Design {
     /// The experiment the plant FMU plays.
     pub scenario: Scenario,
     /// What proves the gains; none where they were not made by synthesis.
-    #[serde(default)]
-    pub synthesis: Option<Synthesis>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub proof: Option<Proof>,
 }
 
-/// What of a controller is not the plant's.
+/// What of a controller is neither the plant's nor the signals'.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct ControllerDesign {
     /// State feedback with integral action.
@@ -50,8 +50,6 @@ pub struct ControllerDesign {
     pub estimator: Estimator,
     /// How an estimated fault is taken out of the loop.
     pub compensation: Compensation,
-    /// Limits of each input (m); the command is clamped to them.
-    pub input_limits: Vec<Limits>,
 }
 
 /// Descriptions of the plant's signals.
@@ -69,6 +67,15 @@ pub struct Signals {
 }
 
 impl Signals {
+    /// The ends of each input's range (m), to which the command is clamped.
+    pub fn input_limits(&self) -> Vec<Limits> {
+        let of = |input: &Signal| Limits {
+            min: input.min,
+            max: input.max,
+        };
+        self.inputs.iter().map(of).collect()
+    }
+
     /// The nominal values of inputs, outputs and states.
     pub fn scaling(&self) -> Scaling {
         let nominal = |signals: &[Signal]| signals.iter().map(|s| s.nominal).collect();
@@ -143,7 +150,7 @@ impl Design {
             observer: controller.observer,
             estimator: controller.estimator,
             compensation: controller.compensation,
-            input_limits: controller.input_limits,
+            input_limits: self.signals.input_limits(),
         }
     }
 
@@ -193,11 +200,6 @@ impl Design {
                 "thresholds",
                 self.controller.estimator.thresholds.len(),
                 dims.outputs,
-            ),
-            (
-                "input limits",
-                self.controller.input_limits.len(),
-                dims.inputs,
             ),
             ("noise levels", scenario.noise.len(), dims.outputs),
             ("references", scenario.reference.len(), tracked.len()),

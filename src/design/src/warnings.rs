@@ -169,8 +169,8 @@ impl ModeDurations {
 
     /// Stability under `dwell` is proved for modes that last.
     fn too_short_to_be_proved(&self, design: &Design) -> Option<Warning> {
-        let synthesis = design.synthesis.as_ref()?;
-        let proved = [synthesis.state_feedback.dwell, synthesis.observer.dwell];
+        let proof = design.proof.as_ref()?;
+        let proved = [proof.state_feedback.dwell, proof.observer.dwell];
         let needed = proved.iter().flatten().map(|dwell| dwell.samples);
         let needed = needed.reduce(f64::max)?;
         let count = self.0.len();
@@ -230,7 +230,7 @@ impl<'a> Steady<'a> {
         let step: Vec<f64> = step.map(|(&output, y)| y - point.y[output]).collect();
         let u0 = DVector::from_column_slice(&point.u);
         let mut u = &u0 + &self.gain * DVector::from_vec(step);
-        for (value, limits) in u.iter_mut().zip(&design.controller.input_limits) {
+        for (value, limits) in u.iter_mut().zip(design.signals.input_limits()) {
             *value = value
                 .min(limits.max.unwrap_or(f64::INFINITY))
                 .max(limits.min.unwrap_or(f64::NEG_INFINITY));

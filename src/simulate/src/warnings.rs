@@ -87,7 +87,7 @@ pub fn of_runs(design: &Design, runs: &[Trajectory]) -> Vec<RunWarning> {
 /// Inputs that spend many samples of a run at a limit.
 fn saturated(design: &Design, run: &Trajectory) -> Vec<RunWarning> {
     let samples = run.records.len().max(1) as f64;
-    let limits = design.controller.input_limits.iter().enumerate();
+    let limits = design.signals.inputs.iter().enumerate();
     let shares = limits.map(|(input, limit)| {
         let at_limit = |record: &&Record| {
             let u = Some(record.u[input]);
@@ -106,10 +106,10 @@ fn saturated(design: &Design, run: &Trajectory) -> Vec<RunWarning> {
 
 /// Commands that the noise of the sensors moves by a large part of their range (or nominal value).
 fn noisy_commands(design: &Design) -> Vec<RunWarning> {
-    let Some(synthesis) = &design.synthesis else {
+    let Some(proof) = &design.proof else {
         return Vec::new();
     };
-    let noise = &synthesis.running_loop.command_noise;
+    let noise = &proof.running_loop.command_noise;
     let inputs = design.signals.inputs.iter().enumerate();
     let deviations = inputs.map(|(index, input)| {
         let range = input.min.zip(input.max);

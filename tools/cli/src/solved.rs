@@ -6,6 +6,7 @@
 
 use crate::failure::Failure;
 use ftc_design::assembly::Request;
+use ftc_design::coverage::CoverageError;
 use ftc_design::{Design, FORMAT, Solver};
 use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
@@ -79,11 +80,9 @@ pub fn load(path: &Path, key: &str) -> Result<Design, Failure> {
     }
     let design: Design =
         serde_json::from_str(&solved.design).map_err(|_| refused("the file is damaged"))?;
-    let Some(synthesis) = &design.synthesis else {
-        return Err(refused("there is no proof in it"));
-    };
-    synthesis
-        .verify(&design.plant)
-        .map_err(|error| refused(&format!("its proof does not hold ({error})")))?;
-    Ok(design)
+    match ftc_design::coverage::prove(&design) {
+        Ok(()) => Ok(design),
+        Err(CoverageError::NoProof) => Err(refused("there is no proof in it")),
+        Err(error) => Err(refused(&format!("its proof does not hold ({error})"))),
+    }
 }

@@ -128,7 +128,7 @@ fn run(library: &[u8], resource: &[u8], design: &Design) -> std::io::Result<Ran>
         .path()
         .join(format!("controller{}", std::env::consts::DLL_SUFFIX));
     fs::write(&path, library)?;
-    fs::write(folder.path().join("design.json"), resource)?;
+    fs::write(folder.path().join(model_description::DESIGN_FILE), resource)?;
     // SAFETY: whoever asks for this trusts the file as an importer does; the documentation says so.
     let library = match unsafe { Library::new(&path) } {
         Ok(library) => library,

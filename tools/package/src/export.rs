@@ -7,7 +7,7 @@ use crate::output::Staging;
 use crate::platform::{PLATFORMS, Platform};
 use crate::signature::SigningKey;
 use crate::ssp::{self, Component, System};
-use ftc_design::Design;
+use ftc_design::{Design, Proof};
 use ftc_simulate::Trajectory;
 use model_description::xml::{self, Document};
 use model_description::{CONTROLLER, Interface, PLANT, VariableTable};
@@ -65,6 +65,9 @@ const STANDARD_LIBRARY: &str =
 
 /// What every FMU shows in a browser of models.
 const ICON: &[u8] = include_bytes!("../assets/model.png");
+
+/// Where the design stands in an FMU.
+pub(crate) const RESOURCE: &str = "resources/design.json";
 
 /// What an export needs of the design and of the machine.
 struct Exporter<'a> {
@@ -131,17 +134,18 @@ pub struct Packed {
 /// [`Error::Contents`] where a file cannot be made from this design.
 pub fn export(design: &Design, options: &Options) -> Result<Exported, Error> {
     let key = options.sign.as_deref().map(SigningKey::read).transpose()?;
-    prove(design)?;
+    let proof = prove(design)?;
     let staging = Staging::new(&options.out)?;
-    let json = |error: serde_json::Error| Error::Contents {
-        file: "resources/design.json".into(),
-        what: error.to_string(),
+    let unwritten = |file: &str, what: String| Error::Contents {
+        file: file.into(),
+        what,
     };
-    let resource = serde_json::to_vec(design).map_err(json)?;
+    let resource =
+        model_description::write_design(design).map_err(|what| unwritten(RESOURCE, what))?;
     let exporter = Exporter {
         design,
-        certificate: serde_json::to_vec_pretty(&Certificate::of(design, &resource))
-            .map_err(json)?,
+        certificate: serde_json::to_vec_pretty(&Certificate::new(proof, &resource))
+            .map_err(|error| unwritten(certificate::PATH, error.to_string()))?,
         resource,
         interface: Interface::from(design),
         runs: documentation::runs(design),
@@ -224,7 +228,7 @@ impl Exporter<'_> {
                 kind.describe(self.design, &self.resource)?.into_bytes(),
             ),
             ("model.png".into(), ICON.into()),
-            ("resources/design.json".into(), self.resource.clone()),
+            (RESOURCE.into(), self.resource.clone()),
             (certificate::PATH.into(), self.certificate.clone()),
             (
                 "documentation/index.html".into(),
@@ -281,15 +285,19 @@ impl Exporter<'_> {
     }
 }
 
-fn prove(design: &Design) -> Result<(), Error> {
-    let refused = |what: String| Error::Uncertified(what);
-    let synthesis = design
-        .synthesis
-        .as_ref()
-        .ok_or_else(|| refused("the design carries no certificate and is not exported".into()))?;
-    synthesis
-        .verify(&design.plant)
-        .map_err(|error| refused(format!("the certificate does not check ({error})")))
+/// The design's proof, gone through once more.
+fn prove(design: &Design) -> Result<Proof, Error> {
+    let Some(synthesis) = design.synthesis() else {
+        return Err(Error::Uncertified(
+            "the design carries no certificate and is not exported".into(),
+        ));
+    };
+    match synthesis.verify(&design.plant) {
+        Ok(()) => Ok(synthesis.into()),
+        Err(error) => Err(Error::Uncertified(format!(
+            "the certificate does not check ({error})"
+        ))),
+    }
 }
 
 /// The generic binaries of one platform.

@@ -2,12 +2,12 @@
 
 use crate::Error;
 use crate::binary::{Ran, Runner};
-use crate::certificate::{self, Certificate, Promise};
-use crate::export::{HOST, KINDS, Kind};
+use crate::certificate::{self, Certificate};
+use crate::export::{HOST, KINDS, Kind, RESOURCE};
 use crate::platform::PLATFORMS;
 use crate::reading;
 use crate::signature::{self, Origin, VerifyingKey};
-use ftc_design::{Design, LostSensors};
+use ftc_design::{Design, DwellTime, LostSensors, Lyapunov, Proof};
 use quick_xml::escape::unescape;
 use quick_xml::events::Event;
 use serde_json::{Value, json};
@@ -15,7 +15,6 @@ use std::collections::BTreeMap;
 use std::fmt;
 use std::path::Path;
 
-const DESIGN: &str = "resources/design.json";
 const DESCRIPTION: &str = "modelDescription.xml";
 
 /// Why an FMU is not verified.
@@ -85,7 +84,7 @@ pub fn verify_with(path: &Path, checks: &Checks) -> Result<Verification, Error> 
 fn is_known(path: &str) -> bool {
     let folders = ["documentation/", "binaries/"];
     let files = [
-        DESIGN,
+        RESOURCE,
         DESCRIPTION,
         certificate::PATH,
         signature::MANIFEST,
@@ -127,13 +126,13 @@ impl Fmu {
 
     /// The bytes of the design.
     pub(crate) fn resource(&self) -> Result<&Vec<u8>, Refusal> {
-        self.file(DESIGN)
+        self.file(RESOURCE)
     }
 
     /// Which FMU it is, and its design.
     pub(crate) fn design(&self) -> Result<(&'static Kind, Design), Refusal> {
         let bytes = self.resource()?;
-        Ok((self.kind(bytes)?, parse(DESIGN, bytes)?))
+        Ok((self.kind(bytes)?, parse(RESOURCE, bytes)?))
     }
 
     /// The binary for this machine.
@@ -144,25 +143,16 @@ impl Fmu {
 
     fn verify(&self, origin: Origin) -> Result<Verification, Refusal> {
         let bytes = self.resource()?;
-        let (kind, design) = self.design()?;
-        design
-            .check()
-            .map_err(|error| Unproved(error.to_string()))?;
+        let (kind, mut design) = self.design()?;
         let shipped: Certificate = parse(certificate::PATH, self.file(certificate::PATH)?)?;
-        ftc_design::coverage::check(&design).map_err(|error| Unproved(error.to_string()))?;
-        let expected = Certificate::of(&design, bytes)
-            .ok_or_else(|| Unproved(format!("{DESIGN} holds no proof: export it again")))?;
-        shipped.agree(&expected).map_err(Unproved)?;
-        if let Some(synthesis) = &design.synthesis {
-            synthesis
-                .verify(&design.plant)
-                .map_err(|error| Unproved(format!("{error}: export the design again")))?;
-        }
+        let proof = shipped.proof_of(bytes).map_err(Unproved)?;
+        design.proof = Some(proof.clone());
+        ftc_design::coverage::prove(&design).map_err(|error| Unproved(error.to_string()))?;
         self.check_description(kind, &design, bytes)?;
         let platforms = self.check_binaries(&kind.identifier(&design))?;
         Ok(Verification {
             design,
-            certificate: shipped,
+            proof,
             platforms,
             origin,
             ran: Ran::NotRun("nobody asked for it".into()),
@@ -187,7 +177,7 @@ impl Fmu {
             |kind: &&Kind| guid.as_ref() == Some(&model_description::guid(kind.binary, design));
         KINDS.iter().find(belongs).ok_or_else(|| {
             Unproved(format!(
-                "the guid in {DESCRIPTION} does not belong to {DESIGN}: one of them was changed, export it again"
+                "the guid in {DESCRIPTION} does not belong to {RESOURCE}: one of them was changed, export it again"
             ))
         })
     }
@@ -209,7 +199,7 @@ impl Fmu {
             .count()
             + 1;
         Err(Unproved(format!(
-            "{DESCRIPTION} is not the one of {DESIGN} from line {line} on: it was changed, or another version \
+            "{DESCRIPTION} is not the one of {RESOURCE} from line {line} on: it was changed, or another version \
              of ftc-fmu wrote it; export it again"
         )))
     }
@@ -253,7 +243,7 @@ pub struct Verification {
     /// The design that the FMU holds.
     pub design: Design,
     /// What is promised, and what proves it.
-    pub certificate: Certificate,
+    pub proof: Proof,
     /// Platforms for which there is a binary.
     pub platforms: Vec<&'static str>,
     /// Who has signed it.
@@ -264,13 +254,13 @@ pub struct Verification {
 
 impl fmt::Display for Verification {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let claims = &self.certificate.claims;
+        let (control, observer) = promises(&self.proof);
         let modes = &self.design.plant.modes;
         writeln!(f, "{}: proved", self.design.name)?;
         let mut line = |name: &str, value: String| writeln!(f, "  {name:<21} {value}");
-        line("state feedback", promise(&claims.state_feedback))?;
+        line("state feedback", control.to_string())?;
         for (index, mode) in modes.iter().enumerate() {
-            let gamma = claims.gamma.as_ref().map_or_else(
+            let gamma = self.proof.state_feedback.gamma.as_ref().map_or_else(
                 || "no attenuation is claimed".into(),
                 |gamma| {
                     format!(
@@ -281,8 +271,8 @@ impl fmt::Display for Verification {
             );
             line(&format!("mode {} ({})", index + 1, mode.name), gamma)?;
         }
-        line("observer", promise(&claims.observer))?;
-        let running = &claims.running_loop;
+        line("observer", observer.to_string())?;
+        let running = &self.proof.running_loop;
         for (index, mode) in modes.iter().enumerate() {
             let gamma = running
                 .gamma_loop
@@ -317,7 +307,7 @@ impl fmt::Display for Verification {
         }
         line(
             "scope",
-            format!("the linear loop of {DESIGN}, while no input is at a limit"),
+            format!("the linear loop of {RESOURCE}, while no input is at a limit"),
         )?;
         line(
             "how",
@@ -350,7 +340,7 @@ impl fmt::Display for Verification {
 impl Verification {
     /// The report a program reads.
     pub fn json(&self) -> Value {
-        let claims = &self.certificate.claims;
+        let running = &self.proof.running_loop;
         let of = |promise: &Promise| {
             json!({
                 "lyapunov": promise.lyapunov,
@@ -360,17 +350,18 @@ impl Verification {
                 "dwell_time_seconds": promise.dwell.map(|dwell| dwell.seconds),
             })
         };
+        let (control, observer) = promises(&self.proof);
         json!({
             "verified": true,
             "name": self.design.name,
-            "state_feedback": of(&claims.state_feedback),
-            "gamma": claims.gamma,
-            "gamma_loop": claims.running_loop.gamma_loop,
-            "gamma_loop_switching": claims.running_loop.switching.as_ref().map(|s| s.gamma),
-            "noise_gain": claims.running_loop.noise_gain,
-            "fault_gain": claims.running_loop.fault_gain,
-            "lost_sensors": claims.running_loop.lost,
-            "observer": of(&claims.observer),
+            "state_feedback": of(&control),
+            "gamma": self.proof.state_feedback.gamma,
+            "gamma_loop": running.gamma_loop,
+            "gamma_loop_switching": running.switching.as_ref().map(|s| s.gamma),
+            "noise_gain": running.noise_gain,
+            "fault_gain": running.fault_gain,
+            "lost_sensors": running.lost,
+            "observer": of(&observer),
             "not_proved": ftc_design::coverage::UNCOVERED,
             "platforms": self.platforms,
             "ran": self.ran,
@@ -401,13 +392,42 @@ fn survives(entry: &LostSensors) -> String {
     }
 }
 
-fn promise(promise: &Promise) -> String {
-    let decay = promise.decay;
-    match &promise.dwell {
-        None => format!("stable under arbitrary switching, decay {decay} per sample"),
-        Some(dwell) => format!(
-            "stable when modes last on average longer than {:.2} samples ({:.4} s), decay {decay} per sample within a mode",
-            dwell.samples, dwell.seconds
-        ),
+/// Stability of one of the two loops.
+struct Promise {
+    lyapunov: Lyapunov,
+    decay: f64,
+    dwell: Option<DwellTime>,
+}
+
+/// Of the state feedback and of the observer.
+fn promises(proof: &Proof) -> (Promise, Promise) {
+    let (control, observer) = (&proof.state_feedback, &proof.observer);
+    let control = Promise {
+        lyapunov: control.lyapunov,
+        decay: control.decay,
+        dwell: control.dwell,
+    };
+    let observer = Promise {
+        lyapunov: observer.spec.lyapunov,
+        decay: observer.spec.decay,
+        dwell: observer.dwell,
+    };
+    (control, observer)
+}
+
+impl fmt::Display for Promise {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let decay = self.decay;
+        match &self.dwell {
+            None => write!(
+                f,
+                "stable under arbitrary switching, decay {decay} per sample"
+            ),
+            Some(dwell) => write!(
+                f,
+                "stable when modes last on average longer than {:.2} samples ({:.4} s), decay {decay} per sample within a mode",
+                dwell.samples, dwell.seconds
+            ),
+        }
     }
 }

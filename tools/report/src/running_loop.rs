@@ -1,15 +1,15 @@
 //! What is proved of the loop that runs, in words and as JSON.
 
-use ftc_design::{Design, LostSensors, Lyapunov, Signal, Synthesis};
+use ftc_design::{Design, LostSensors, Lyapunov, Proof, Signal};
 use serde_json::{Value, json};
 
 type Lines = Vec<(String, String)>;
 
 /// Gains of the whole loop, and under which switching it is stable.
-pub fn gains(design: &Design, synthesis: &Synthesis) -> Lines {
-    let running = &synthesis.running_loop;
+pub fn gains(design: &Design, proof: &Proof) -> Lines {
+    let running = &proof.running_loop;
     let inputs = &design.signals.inputs;
-    let mut lines = vec![("stability".to_owned(), stability(synthesis))];
+    let mut lines = vec![("stability".to_owned(), stability(proof))];
     for mode in 0..running.noise_gain.len() {
         let gamma = match &running.gamma_loop {
             Some(gamma) => format!("gamma_loop {}", short(gamma[mode])),
@@ -40,18 +40,14 @@ pub fn gains(design: &Design, synthesis: &Synthesis) -> Lines {
 }
 
 /// Under which switching the running loop is proved stable.
-pub fn stability(synthesis: &Synthesis) -> String {
-    let dwell = [synthesis.state_feedback.dwell, synthesis.observer.dwell];
+pub fn stability(proof: &Proof) -> String {
+    let dwell = [proof.state_feedback.dwell, proof.observer.dwell];
     let longest = dwell
         .iter()
         .flatten()
         .map(|dwell| dwell.samples)
         .reduce(f64::max);
-    let decay = synthesis
-        .state_feedback
-        .spec
-        .decay
-        .max(synthesis.observer.spec.decay);
+    let decay = proof.state_feedback.decay.max(proof.observer.spec.decay);
     match longest {
         None => {
             format!("proved under arbitrary switching, any decay slower than {decay} per sample")
@@ -64,8 +60,8 @@ pub fn stability(synthesis: &Synthesis) -> String {
 
 /// The sentence an engineer wants first: "Survives the loss of level 1; survives both by the model
 /// alone; does not survive angle".
-pub fn survival(design: &Design, synthesis: &Synthesis) -> String {
-    let table = &synthesis.running_loop.lost;
+pub fn survival(design: &Design, proof: &Proof) -> String {
+    let table = &proof.running_loop.lost;
     let outputs = &design.signals.outputs;
     let all = |entry: &&LostSensors| entry.sensors.len() == outputs.len();
     let singles = table.iter().filter(|entry| entry.sensors.len() == 1);
@@ -132,7 +128,7 @@ fn names(entry: &LostSensors, outputs: &[Signal]) -> String {
 }
 
 /// The table of lost sensors, and how often the set may change.
-pub fn lost(design: &Design, synthesis: &Synthesis) -> Lines {
+pub fn lost(design: &Design, proof: &Proof) -> Lines {
     let outputs = &design.signals.outputs;
     let row = |entry: &LostSensors| {
         let seen = match entry.observable.iter().filter(|o| **o).count() {
@@ -150,22 +146,22 @@ pub fn lost(design: &Design, synthesis: &Synthesis) -> Lines {
         };
         (names(entry, outputs), format!("{seen}; {stable}"))
     };
-    let mut lines: Lines = synthesis.running_loop.lost.iter().map(row).collect();
-    if synthesis.running_loop.lost.iter().any(|entry| entry.stable) {
-        lines.push(("changes".to_owned(), changes(design, synthesis)));
+    let mut lines: Lines = proof.running_loop.lost.iter().map(row).collect();
+    if proof.running_loop.lost.iter().any(|entry| entry.stable) {
+        lines.push(("changes".to_owned(), changes(design, proof)));
     }
     lines
 }
 
-fn changes(design: &Design, synthesis: &Synthesis) -> String {
+fn changes(design: &Design, proof: &Proof) -> String {
     let dwell = design.controller.observer.minimum_dwell;
-    let by_mode = synthesis
+    let by_mode = proof
         .observer
         .lost
         .as_ref()
-        .is_some_and(|proof| proof.lyapunov.iter().any(|list| list.len() > 1));
+        .is_some_and(|lost| lost.lyapunov.iter().any(|list| list.len() > 1));
     match (dwell, by_mode) {
-        (0, _) if synthesis.observer.spec.lyapunov == Lyapunov::Dwell => {
+        (0, _) if proof.observer.spec.lyapunov == Lyapunov::Dwell => {
             "proved when the set changes at any sample, and the modes last as above".into()
         }
         (0, _) => "proved when set and mode change at any sample".into(),

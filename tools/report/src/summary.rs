@@ -6,7 +6,7 @@ use crate::warnings;
 use ftc_control::parameters::{Compensation, EstimatorMethod, Hypotheses, ObserverKind};
 use ftc_design::augmented::assumes_input_disturbance;
 use ftc_design::{
-    ControlSpec, Design, DesignError, Failure, ObserverDesign, Signal, StateFeedback,
+    ControlProof, ControlSpec, Design, DesignError, Failure, ObserverProof, Signal, StateFeedback,
 };
 use serde_json::{Value, json};
 use std::fmt::Write;
@@ -30,22 +30,22 @@ pub type Section = (&'static str, Vec<(String, String)>);
 /// The report's contents, also for the FMU's documentation.
 pub fn sections(design: &Design) -> Vec<Section> {
     let mut sections = vec![("Design", overview(design))];
-    if let Some(synthesis) = &design.synthesis {
+    if let Some(synthesis) = design.synthesis() {
         sections.push((
             "State feedback",
             feedback(design, &synthesis.state_feedback),
         ));
     }
     sections.push(("Observer", observer(design)));
-    if let Some(synthesis) = &design.synthesis {
-        sections.push(("Running loop", running_loop::gains(design, synthesis)));
-        sections.push(("Lost sensors", running_loop::lost(design, synthesis)));
+    if let Some(proof) = &design.proof {
+        sections.push(("Running loop", running_loop::gains(design, proof)));
+        sections.push(("Lost sensors", running_loop::lost(design, proof)));
     }
     sections.push(("Fault estimator", estimator(design)));
     let compensation = compensation(design.controller.compensation);
     sections.push(("Compensation", vec![line("method", compensation)]));
-    if let Some(synthesis) = &design.synthesis {
-        sections.push(("Certificate", certificate(&synthesis.state_feedback)));
+    if let Some(proof) = &design.proof {
+        sections.push(("Certificate", certificate(&proof.state_feedback)));
     }
     sections
 }
@@ -59,9 +59,9 @@ fn overview(design: &Design) -> Vec<(String, String)> {
     let dims = plant.dimensions();
     let names: Vec<&str> = plant.modes.iter().map(|mode| mode.name.as_str()).collect();
     let survival = design
-        .synthesis
+        .proof
         .as_ref()
-        .map(|synthesis| line("lost sensors", running_loop::survival(design, synthesis)));
+        .map(|proof| line("lost sensors", running_loop::survival(design, proof)));
     let mut lines: Vec<_> = survival.into_iter().collect();
     lines.extend([
         line("name", &design.name),
@@ -147,8 +147,8 @@ fn observer(design: &Design) -> Vec<(String, String)> {
     };
     let mut lines = vec![line("kind", kind)];
     lines.extend(observer.note.iter().map(|note| line("because", note)));
-    if let Some(synthesis) = &design.synthesis {
-        lines.extend(observer_decay(&synthesis.observer));
+    if let Some(proof) = &design.proof {
+        lines.extend(observer_decay(&proof.observer));
     }
     lines
 }
@@ -251,7 +251,7 @@ fn compensation(compensation: Compensation) -> &'static str {
     }
 }
 
-fn observer_decay(observer: &ObserverDesign) -> Vec<(String, String)> {
+fn observer_decay(observer: &ObserverProof) -> Vec<(String, String)> {
     let radius = |(index, radius): (usize, &f64)| {
         line(
             format!("mode {}", index + 1),
@@ -266,7 +266,7 @@ fn observer_decay(observer: &ObserverDesign) -> Vec<(String, String)> {
     lines
 }
 
-fn certificate(control: &StateFeedback) -> Vec<(String, String)> {
+fn certificate(control: &ControlProof) -> Vec<(String, String)> {
     let guarantee = match &control.dwell {
         None => "stable under arbitrary switching".to_string(),
         Some(dwell) => format!(
@@ -275,7 +275,7 @@ fn certificate(control: &StateFeedback) -> Vec<(String, String)> {
         ),
     };
     vec![
-        line("Lyapunov", control.spec.lyapunov.to_string()),
+        line("Lyapunov", control.lyapunov.to_string()),
         line("guarantee", guarantee),
         line(
             "proof",
@@ -296,14 +296,9 @@ fn with_units(values: &[f64], signals: &[Signal]) -> String {
 /// The report a program reads.
 pub fn json(design: &Design, warnings: &[String]) -> String {
     let estimator = &design.controller.estimator;
-    let control = design
-        .synthesis
-        .as_ref()
-        .map(|synthesis| &synthesis.state_feedback);
-    let running = design
-        .synthesis
-        .as_ref()
-        .map(|synthesis| &synthesis.running_loop);
+    let synthesis = design.synthesis();
+    let control = synthesis.as_ref().map(|found| &found.state_feedback);
+    let running = synthesis.as_ref().map(|found| &found.running_loop);
     let deviations: Vec<&Vec<f64>> = estimator.predictors.iter().map(|p| &p.deviation).collect();
     let samples: Vec<usize> = estimator.predictors.iter().map(|p| p.samples).collect();
     let value = json!({
@@ -330,8 +325,8 @@ pub fn json(design: &Design, warnings: &[String]) -> String {
         "observer": {
             "kind": design.controller.observer.kind,
             "note": design.controller.observer.note,
-            "decay": design.synthesis.as_ref().map(|s| s.observer.spec.decay),
-            "spectral_radius": design.synthesis.as_ref().map(|s| s.observer.spectral_radius.clone()),
+            "decay": synthesis.as_ref().map(|s| s.observer.spec.decay),
+            "spectral_radius": synthesis.as_ref().map(|s| s.observer.spectral_radius.clone()),
         },
         "estimator": {
             "method": estimator.method,

@@ -4,8 +4,7 @@ use super::figure::{Figure, Mark, Series};
 use super::page::{Column, KeyNumber, Page, Row, Section, Table};
 use super::{demo, svg};
 use ftc_control::parameters::{
-    Compensation, Estimator, EstimatorMethod, FeedbackGains, Limits, Observer, ObserverKind,
-    StateFeedback,
+    Compensation, Estimator, EstimatorMethod, FeedbackGains, Observer, ObserverKind, StateFeedback,
 };
 use ftc_control::{Controller, Matrix};
 use ftc_design::{ControllerDesign, Design, FORMAT, Signal, Signals};
@@ -50,7 +49,7 @@ fn paper(noise: f64) -> Design {
         plant: common::plant(common::Channel::State),
         controller,
         true_plant: TruePlant::default(),
-        synthesis: None,
+        proof: None,
         scenario: common::scenario(common::reference("levels"), noise, 1),
     }
 }
@@ -123,10 +122,9 @@ fn lags(outputs: usize, disturbances: usize, steps: u64) -> Design {
                 largest_fault: vec![1e6; outputs],
             },
             compensation: Compensation::None,
-            input_limits: vec![Limits::default(); outputs],
         },
         true_plant: TruePlant::default(),
-        synthesis: None,
+        proof: None,
         scenario: Scenario {
             steps,
             noise: vec![0.02; outputs],

@@ -39,8 +39,8 @@ fn idle_weights(file: &DesignFile, design: &Design) -> Option<String> {
         .filter(|(_, given)| *given)
         .map(|(name, _)| format!("controller.{name}"))
         .collect();
-    let control = &design.synthesis.as_ref()?.state_feedback;
-    let reason = match (&control.gamma, control.spec.objective) {
+    let control = &design.proof.as_ref()?.state_feedback;
+    let reason = match (&control.gamma, control.objective) {
         (_, Objective::Decay) => {
             "objective = \"decay\" looks at nothing but the decay: ask for \"attenuation\""
         }

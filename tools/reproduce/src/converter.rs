@@ -216,12 +216,12 @@ fn predict(
     let controller = &design.controller;
     let spec = PredictiveSpec {
         tracked: controller.feedback.tracked.clone(),
-        output_weight: design.synthesis.as_ref().map_or_else(
+        output_weight: design.proof.as_ref().map_or_else(
             || vec![1.0; controller.feedback.tracked.len()],
-            |synthesis| synthesis.state_feedback.spec.output_weight.clone(),
+            |proof| proof.state_feedback.output_weight.clone(),
         ),
-        input_weight: vec![input_weight; controller.input_limits.len()],
-        limits: controller.input_limits.clone(),
+        input_weight: vec![input_weight; design.signals.inputs.len()],
+        limits: design.signals.input_limits(),
         noise: design.scenario.noise.clone(),
         disturbance: vec![1.0; design.scenario.disturbance.len()],
         horizon,

@@ -133,7 +133,7 @@ pub(crate) fn verify(
         prove_changes(plant, design, certificate, &matrices)?;
     }
     require(&[(
-        design.observer.minimum_dwell >= due_dwell(design, certificate),
+        design.observer.minimum_dwell == due_dwell(design, certificate),
         "the least time between changes of the lost sensors does not follow from the proof",
     )])
 }

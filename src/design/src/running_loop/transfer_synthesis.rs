@@ -1,7 +1,7 @@
 //! The least time between resets of bumpless transfer that can be proved.
 
 use super::Subject;
-use super::transfer::{Step, TRANSFER_DECAY, TransferCertificate, due, prove, steps};
+use super::transfer::{Step, TRANSFER_DECAY, TransferCertificate, prove, steps};
 use crate::Lyapunov;
 use crate::blocks::{BlockKind, BlockName};
 use crate::certificate::{FactoredLyapunov, largest_ratio};
@@ -36,7 +36,7 @@ pub(super) fn certify(subject: &Subject) -> Option<TransferCertificate> {
             false => for_all(subject, &steps, decay),
         }
     });
-    found.min_by_key(|certificate| certificate.samples)
+    found.min_by_key(TransferCertificate::samples)
 }
 
 /// Raises `mu` until it can be proved.
@@ -49,7 +49,6 @@ fn proved(
     [1e-9, 1e-6, 1e-3, 0.1].iter().find_map(|allowance| {
         let mu = mu.max(1.0) * (1.0 + allowance);
         let candidate = TransferCertificate {
-            samples: due(mu, decay),
             decay,
             mu,
             lyapunov: lyapunov.clone(),

@@ -13,12 +13,11 @@ use ftc_design::{ControlSpec, Design, DesignError, Objective, RequestError, stat
 /// [`state_feedback::synthesise`].
 pub fn additive(design: &Design) -> Result<ControllerParameters, DesignError> {
     let synthesis = design
-        .synthesis
-        .as_ref()
+        .synthesis()
         .ok_or(DesignError::Request(RequestError::NotSynthesised))?;
     let spec = ControlSpec {
         objective: Objective::Decay,
-        ..synthesis.state_feedback.spec.clone()
+        ..synthesis.state_feedback.spec
     };
     let ours = &design.controller.feedback;
     let plant = &design.plant;

@@ -53,12 +53,8 @@ pub fn trajectories(
 /// The predictive controller with the design's weights and limits. Its filter is told the noise
 /// and the mean power of the scenario's disturbance.
 fn predictive(design: &Design, played: &Trajectory) -> Result<PredictiveSpec, BaselineError> {
-    let asked = &design
-        .synthesis
-        .as_ref()
-        .ok_or(BaselineError::NoWeights)?
-        .state_feedback
-        .spec;
+    let proof = design.proof.as_ref().ok_or(BaselineError::NoWeights)?;
+    let asked = &proof.state_feedback;
     let outputs = design.signals.outputs.iter();
     let noise = outputs.zip(&design.scenario.noise);
     let channels = design.plant.dimensions().disturbances;
@@ -68,10 +64,10 @@ fn predictive(design: &Design, played: &Trajectory) -> Result<PredictiveSpec, Ba
         (sum / records.len().max(1) as f64).sqrt()
     };
     Ok(PredictiveSpec {
-        tracked: asked.tracked.clone(),
+        tracked: design.controller.feedback.tracked.clone(),
         output_weight: asked.output_weight.clone(),
         input_weight: asked.input_weight.clone(),
-        limits: design.controller.input_limits.clone(),
+        limits: design.signals.input_limits(),
         noise: noise
             .map(|(output, noise)| noise.max(LEAST_NOISE * output.nominal))
             .collect(),

@@ -95,14 +95,8 @@ fn explanation(variant: Variant) -> &'static str {
 pub fn modes(design: &Design) -> Table {
     let controller = &design.controller;
     let modes = &design.plant.modes;
-    let control = design
-        .synthesis
-        .as_ref()
-        .map(|synthesis| &synthesis.state_feedback);
-    let running = design
-        .synthesis
-        .as_ref()
-        .map(|synthesis| &synthesis.running_loop);
+    let control = design.proof.as_ref().map(|proof| &proof.state_feedback);
+    let running = design.proof.as_ref().map(|proof| &proof.running_loop);
     let gamma = control.and_then(|control| control.gamma.as_ref());
     let mut columns = vec![
         Column::name("mode"),
