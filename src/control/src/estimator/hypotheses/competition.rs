@@ -182,7 +182,7 @@ impl Bank {
                 convinced,
             });
         }
-        let displaced = self.displaced(state, slot, model, reading) & reading.valid;
+        let displaced = state.displaced(&state.seen[slot].output) & reading.valid;
         if accused == 0 && displaced != 0 && !state.first {
             if unlikely {
                 let value = score
@@ -375,7 +375,7 @@ impl Bank {
                 let _ = old;
                 let factor = 1.0 + SCALE_MEAN;
                 trial.r[q] = reading.y[q] - factor * output;
-                let size = layout.size();
+                let stride = layout.stride();
                 for j in 0..p {
                     if !has(reading.valid, j) {
                         continue;
@@ -386,10 +386,10 @@ impl Bank {
                         let mut inner = 0.0;
                         if j == q {
                             for (l, &cj) in model.c[j * n..(j + 1) * n].iter().enumerate() {
-                                inner += cj * factor * h.cov[i * size + l];
+                                inner += cj * factor * h.cov[i * stride + l];
                             }
                         } else {
-                            inner = trial.rows[j * size + i];
+                            inner = trial.rows[j * stride + i];
                         }
                         sum += factor * c * inner;
                     }
@@ -635,14 +635,14 @@ impl Bank {
                         if !has(set, q) {
                             continue;
                         }
-                        let (k, size) = (fault + q, layout.size());
+                        let (k, stride) = (fault + q, layout.stride());
                         let variance = self.settings.fault_size[q] * self.settings.fault_size[q];
                         if has(parent.stuck | parent.scaled, q)
                             || (!bias && !has(parent.additive, q))
                         {
                             child.open(k, 0.0, variance);
                         } else {
-                            child.cov[k * size + k] += variance;
+                            child.cov[k * stride + k] += variance;
                         }
                     }
                 }
@@ -669,13 +669,12 @@ impl Bank {
                 }
                 Action::Scale(q) => child.open(fault + q, SCALE_MEAN, SCALE_VARIANCE),
                 Action::Start => {
-                    let size = layout.size();
+                    let stride = layout.stride();
                     for (k, sd) in self.settings.start_elsewhere.iter().enumerate() {
-                        child.cov[k * size + k] += sd * sd;
+                        child.cov[k * stride + k] += sd * sd;
                     }
                 }
                 Action::Home | Action::Drift(_) => {
-                    let size = layout.size();
                     for k in 0..n {
                         let variance = self.own_variance(model, &state.own, k);
                         child.open(k, state.own[k], variance);
@@ -684,7 +683,6 @@ impl Bank {
                     for (k, size) in model.load_size.iter().enumerate() {
                         child.open(layout.load() + k, 0.0, 0.01 * size * size);
                     }
-                    let _ = size;
                     for q in 0..p {
                         if has(child.additive, q) {
                             child.open(
@@ -708,12 +706,12 @@ impl Bank {
                     }
                 }
                 Action::Loosen => {
-                    let (load, size) = (layout.load() + layout.state_load(), layout.size());
+                    let (load, stride) = (layout.load() + layout.state_load(), layout.stride());
                     for (i, v) in self.looseness(model, parent, &state.u).enumerate() {
                         for (row, column) in
                             [(i, i), (i, load + i), (load + i, i), (load + i, load + i)]
                         {
-                            child.cov[row * size + column] += v;
+                            child.cov[row * stride + column] += v;
                         }
                     }
                 }

@@ -24,7 +24,7 @@ pub use model::Layout;
 use super::super::parameters::Hypotheses;
 use crate::compensation::is_measurement;
 use competition::{Candidates, QUIET};
-use hypothesis::Innovation;
+use hypothesis::{Innovation, Step};
 use linear::dot;
 use model::ModeModel;
 use serde::{Deserialize, Serialize};
@@ -47,6 +47,8 @@ pub struct Bank {
     modes: Vec<ModeModel>,
     settings: Hypotheses,
     rotation: Vec<(f64, f64)>,
+    /// Of each pair of the disturbance: the error of its angle, and the least growth of its variance.
+    waves: Vec<(f64, f64)>,
     prices: Prices,
     /// Noise deviation of each sensor over its threshold (p).
     noise_per_threshold: Vec<f64>,
@@ -142,6 +144,8 @@ pub struct BankState {
     /// The model's own run under the input alone (n), and its outputs (p).
     own: Vec<f64>,
     own_output: Vec<f64>,
+    /// Variance of a reading around these outputs (p).
+    own_spread: Vec<f64>,
     /// Outputs that the leading hypothesis expects of healthy sensors (p).
     pub expected: Vec<f64>,
     /// What the readings leave unexplained; of an accused sensor its fault (p).
@@ -161,7 +165,7 @@ pub struct BankState {
 crate::state!(BankState {
     parts: [
         slots, seen, candidates, scratch, trial, u, moved, noise, evidence, mean, count, own,
-        own_output, expected, residual, load
+        own_output, own_spread, expected, residual, load
     ],
     constants: [],
     counters: [
@@ -211,7 +215,7 @@ impl Bank {
         }
         state.mode = Some(mode);
         let bias = self.output_error();
-        self.run_alone(state, model);
+        self.run_alone(state, model, reading);
         for slot in state.live.slots() {
             let h = &state.slots[slot];
             let seen = &mut state.seen[slot];
@@ -243,15 +247,15 @@ impl Bank {
             self.compete(state, model, reading);
         }
         state.first = false;
-        let displaced = self.displaced(state, state.best, model, reading);
-        state.suspect |= displaced & !state.slots[state.best].accused();
         self.conclude(state, model, reading);
+        let displaced = state.displaced(&state.expected);
+        state.suspect |= displaced & !state.slots[state.best].accused();
     }
 
     /// Another mode: what the model misses, and what a load does, may differ.
     fn enter(&self, state: &mut BankState, mode: usize) {
         let Layout { n, m, .. } = self.layout;
-        let size = self.layout.size();
+        let stride = self.layout.stride();
         let load = self.layout.load() + self.layout.state_load();
         let model = &self.modes[mode];
         let error = self.settings.model_error * self.settings.model_error;
@@ -260,7 +264,7 @@ impl Bank {
             let mean = dot(&h.z[load..load + n], &h.z[load..load + n]) / n.max(1) as f64;
             for i in 0..n {
                 let off = h.z[i] - model.x0[i];
-                h.cov[i * size + i] += error * off * off;
+                h.cov[i * stride + i] += error * off * off;
                 let mut sum = 0.0;
                 for j in 0..n {
                     let v = model.a[i * n + j] * (h.z[j] - model.x0[j]);
@@ -271,19 +275,22 @@ impl Bank {
                     sum += v * v;
                 }
                 let k = load + i;
-                h.cov[k * size + k] += error * sum + 2.0 * (h.z[k] * h.z[k]).max(mean);
+                h.cov[k * stride + k] += error * sum + 2.0 * (h.z[k] * h.z[k]).max(mean);
             }
         }
     }
 
     /// Outputs of the model's own run, with the disturbance as it is known.
-    fn run_alone(&self, state: &mut BankState, model: &ModeModel) {
-        let Layout { n, p, d, .. } = self.layout;
+    fn run_alone(&self, state: &mut BankState, model: &ModeModel, reading: Reading<'_>) {
         let z = &state.slots[state.best].z;
-        for q in 0..p {
-            state.own_output[q] = model.output_offset[q]
-                + dot(&model.c[q * n..(q + 1) * n], &state.own)
-                + dot(&model.f[q * d..(q + 1) * d], &z[n..n + d]);
+        let outputs = state.own_output.iter_mut().zip(&mut state.own_spread);
+        for (q, ((output, spread), noise)) in outputs.zip(reading.noise).enumerate() {
+            *output = model.output(q, &state.own, z);
+            let mut variance = noise * noise;
+            for &(k, c) in &model.outputs.parts(q)[0] {
+                variance += c * c * self.own_variance(model, &state.own, k);
+            }
+            *spread = variance;
         }
     }
 
@@ -322,42 +329,11 @@ impl Bank {
         }
     }
 
-    /// Sensors that loads have moved away from the model's own run.
-    fn displaced(
-        &self,
-        state: &BankState,
-        slot: usize,
-        model: &ModeModel,
-        reading: Reading<'_>,
-    ) -> Sensors {
-        let Layout { n, p, d, .. } = self.layout;
-        let z = &state.slots[slot].z;
-        let mut set = 0;
-        for q in 0..p.min(64) {
-            let output = model.output_offset[q]
-                + dot(&model.c[q * n..(q + 1) * n], &z[..n])
-                + dot(&model.f[q * d..(q + 1) * d], &z[n..n + d]);
-            let mut variance = reading.noise[q] * reading.noise[q];
-            for k in 0..n {
-                let c = model.c[q * n + k];
-                variance += c * c * self.own_variance(model, &state.own, k);
-            }
-            let off = output - state.own_output[q];
-            if off * off > DISPLACED * variance {
-                set |= 1 << q;
-            }
-        }
-        set
-    }
-
     fn conclude(&self, state: &mut BankState, model: &ModeModel, reading: Reading<'_>) {
-        let layout = self.layout;
-        let Layout { n, p, d, .. } = layout;
+        let p = self.layout.p;
         let h = &state.slots[state.best];
-        for q in 0..p {
-            state.expected[q] = model.output_offset[q]
-                + dot(&model.c[q * n..(q + 1) * n], &h.z[..n])
-                + dot(&model.f[q * d..(q + 1) * d], &h.z[n..n + d]);
+        for (q, expected) in state.expected.iter_mut().enumerate() {
+            *expected = model.output(q, &h.z, &h.z);
         }
         let all = if p >= 64 { u64::MAX } else { (1 << p) - 1 };
         state.accused = h.accused() | (all & !reading.valid);
@@ -399,7 +375,7 @@ impl Bank {
     /// (p) of the readings. Spoils the state.
     pub fn differentiate(&self, state: &mut BankState, dy: &[f64]) {
         let Layout { n, p, d, .. } = self.layout;
-        let size = self.layout.size();
+        let stride = self.layout.stride();
         let Some(model) = self.modes.get(state.mode.unwrap_or(0)) else {
             return;
         };
@@ -412,7 +388,7 @@ impl Bank {
                 seen.white[q] = dy.get(q).copied().unwrap_or(0.0);
             }
             linear::solve(&seen.s, p, &mut seen.white);
-            for (row, &white) in seen.rows.chunks_exact(size).zip(&seen.white) {
+            for (row, &white) in seen.rows.chunks_exact(stride).zip(&seen.white) {
                 linear::axpy(&mut h.z, white, row);
             }
         }
@@ -430,33 +406,46 @@ impl Bank {
             *d = new - *old;
             *old = new;
         }
-        let Layout { n, m, d, .. } = self.layout;
+        let Layout { n, m, .. } = self.layout;
         let z = &state.slots[state.best].z;
         for i in 0..n {
+            let [own, waves, _] = model.motion.parts(i);
             let mut sum = model.state_offset[i]
-                + dot(&model.a[i * n..(i + 1) * n], &state.own)
-                + dot(&model.e[i * d..(i + 1) * d], &z[n..n + d]);
+                + linear::sparse_dot(own, &state.own)
+                + linear::sparse_dot(waves, z);
             sum += dot(&model.b[i * m..(i + 1) * m], u);
             state.scratch[i] = crate::kernel::bounded(sum);
         }
         state.own.copy_from_slice(&state.scratch[..n]);
+        let step = Step {
+            layout: self.layout,
+            model,
+            settings: &self.settings,
+            noise: &state.noise,
+            rotation: &self.rotation,
+            waves: &self.waves,
+            bias: self.output_error(),
+            u,
+            moved: &state.moved,
+        };
         for slot in state.live.slots() {
-            state.slots[slot].advance(
-                self.layout,
-                model,
-                &self.settings,
-                &state.noise,
-                &self.rotation,
-                self.output_error(),
-                u,
-                &state.moved,
-                &mut state.scratch,
-            );
+            state.slots[slot].advance(&step, &mut state.scratch);
         }
     }
 }
 
 impl BankState {
+    /// Sensors that loads have moved away from the model's own run, their `outputs` (p) being expected.
+    fn displaced(&self, outputs: &[f64]) -> Sensors {
+        let own = self.own_output.iter().zip(&self.own_spread);
+        let mut set = 0;
+        for (q, (output, (alone, spread))) in outputs.iter().zip(own).enumerate().take(64) {
+            let off = output - alone;
+            set |= Sensors::from(off * off > DISPLACED * spread) << q;
+        }
+        set
+    }
+
     /// Whether every index in it is one; a state that came as bytes may hold any.
     pub fn sound(&self) -> bool {
         self.live.sound() && self.live.contains(self.best)
