@@ -184,7 +184,7 @@ impl Bank {
                 convinced,
             });
         }
-        if unlikely && !state.first && self.displaced(state, slot, model, reading, APART) != 0 {
+        if unlikely && !state.first && state.own.displaced(&state.seen[slot].output, APART) != 0 {
             let value =
                 score + self.prices.fault + self.trial(state, slot, model, reading, Action::Home);
             state.candidates.add(Candidate {
@@ -318,7 +318,7 @@ impl Bank {
     ) {
         let trusted = self.settings.trusts_model();
         let limit = if trusted { DISPLACED } else { APART };
-        let set = self.displaced(state, slot, model, reading, limit) & reading.valid;
+        let set = state.own.displaced(&state.seen[slot].output, limit) & reading.valid;
         let known =
             |other: usize| state.slots[other].additive == set && !state.slots[other].convinced;
         if set == 0 || !trusted && state.live.slots().any(known) {
@@ -399,7 +399,7 @@ impl Bank {
                 let _ = old;
                 let factor = 1.0 + SCALE_MEAN;
                 trial.r[q] = reading.y[q] - factor * output;
-                let size = layout.size();
+                let stride = layout.stride();
                 for j in 0..p {
                     if !has(reading.valid, j) {
                         continue;
@@ -410,10 +410,10 @@ impl Bank {
                         let mut inner = 0.0;
                         if j == q {
                             for (l, &cj) in model.c[j * n..(j + 1) * n].iter().enumerate() {
-                                inner += cj * factor * h.cov[i * size + l];
+                                inner += cj * factor * h.cov[i * stride + l];
                             }
                         } else {
-                            inner = trial.rows[j * size + i];
+                            inner = trial.rows[j * stride + i];
                         }
                         sum += factor * c * inner;
                     }
@@ -647,14 +647,14 @@ impl Bank {
                         if !has(set, q) {
                             continue;
                         }
-                        let (k, size) = (fault + q, layout.size());
+                        let (k, stride) = (fault + q, layout.stride());
                         let variance = self.settings.fault_size[q] * self.settings.fault_size[q];
                         if has(parent.stuck | parent.scaled, q)
                             || (!bias && !has(parent.additive, q))
                         {
                             child.open(k, 0.0, variance);
                         } else {
-                            child.cov[k * size + k] += variance;
+                            child.cov[k * stride + k] += variance;
                         }
                     }
                 }
@@ -681,9 +681,9 @@ impl Bank {
                 }
                 Action::Scale(q) => child.open(fault + q, SCALE_MEAN, SCALE_VARIANCE),
                 Action::Start => {
-                    let size = layout.size();
+                    let stride = layout.stride();
                     for (k, sd) in self.settings.start_elsewhere.iter().enumerate() {
-                        child.cov[k * size + k] += sd * sd;
+                        child.cov[k * stride + k] += sd * sd;
                     }
                 }
                 Action::Home | Action::Drift(_) => {
@@ -722,12 +722,12 @@ impl Bank {
                     }
                 }
                 Action::Loosen => {
-                    let (load, size) = (layout.load() + layout.state_load(), layout.size());
+                    let (load, stride) = (layout.load() + layout.state_load(), layout.stride());
                     for (i, v) in self.looseness(model, parent, &state.u).enumerate() {
                         for (row, column) in
                             [(i, i), (i, load + i), (load + i, i), (load + i, load + i)]
                         {
-                            child.cov[row * size + column] += v;
+                            child.cov[row * stride + column] += v;
                         }
                     }
                 }

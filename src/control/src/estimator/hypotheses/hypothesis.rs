@@ -3,7 +3,9 @@
 // Matrices are flat and addressed by row and column, as in the equations.
 #![allow(clippy::needless_range_loop)]
 
-use super::linear::{axpy, dot, factor, solve};
+use super::linear::{
+    add_row, combine, dot, factor, mirror, padded, solve, sparse_dot, subtract_squares, turn,
+};
 use super::model::{Jump, Layout, ModeModel};
 use crate::kernel::bounded;
 use crate::parameters::Hypotheses as Settings;
@@ -22,9 +24,9 @@ pub const fn has(set: Sensors, q: usize) -> bool {
 /// One hypothesis.
 #[derive(Debug, PartialEq, Serialize, Deserialize)]
 pub struct Hypothesis {
-    /// Estimate of the joint state (N).
+    /// Estimate of the joint state (N, padded).
     pub z: Vec<f64>,
-    /// Its covariance (N x N).
+    /// Its covariance (N rows, padded).
     pub cov: Vec<f64>,
     /// Estimate of the state a sample ago (n).
     pub before: Vec<f64>,
@@ -49,7 +51,9 @@ pub struct Hypothesis {
 pub struct Innovation {
     /// `y - y_hat` (p).
     pub r: Vec<f64>,
-    /// `C P` (p x N).
+    /// Output that is predicted of a healthy sensor (p).
+    pub output: Vec<f64>,
+    /// `C P` (p rows of N, padded).
     pub rows: Vec<f64>,
     /// Its covariance, then its Cholesky factor (p x p).
     pub s: Vec<f64>,
@@ -80,10 +84,29 @@ crate::state!(Hypothesis {
     counters: [additive, stuck, scaled, convinced, loose, score, misfit]
 });
 crate::state!(Innovation {
-    parts: [r, rows, s, weights, white],
+    parts: [r, output, rows, s, weights, white],
     constants: [],
     counters: [square, sound]
 });
+
+/// From one sample to the next, the same for every hypothesis.
+#[derive(Clone, Copy, Debug)]
+pub struct Step<'a> {
+    pub layout: Layout,
+    pub model: &'a ModeModel,
+    pub settings: &'a Settings,
+    /// Noise deviation (p).
+    pub noise: &'a [f64],
+    /// Cosine and sine of the angle by which each pair of the disturbance turns.
+    pub rotation: &'a [(f64, f64)],
+    /// The error of that angle, and the least growth of the variance, of each pair.
+    pub waves: &'a [(f64, f64)],
+    /// Whether the model's outputs may be wrong.
+    pub bias: bool,
+    /// The input that acts (m), and how it moved (m).
+    pub u: &'a [f64],
+    pub moved: &'a [f64],
+}
 
 impl Innovation {
     /// Room for `layout`.
@@ -91,7 +114,8 @@ impl Innovation {
         let p = layout.p;
         Self {
             r: vec![0.0; p],
-            rows: vec![0.0; p * layout.size()],
+            output: vec![0.0; p],
+            rows: vec![0.0; p * layout.stride()],
             s: vec![0.0; p * p],
             weights: vec![[1.0, 0.0]; p],
             white: vec![0.0; p],
@@ -110,44 +134,35 @@ impl Innovation {
         kinds: Kinds,
         bias: bool,
     ) {
-        let Layout { n, p, d, .. } = layout;
-        let (size, fault) = (layout.size(), layout.fault());
-        let active = if bias || kinds.all() | h.accused() != 0 {
-            size
+        let p = layout.p;
+        let (stride, fault) = (layout.stride(), layout.fault());
+        let width = padded(if bias || kinds.all() | h.accused() != 0 {
+            layout.size()
         } else {
             fault
-        };
+        });
         for q in 0..p {
-            let row = &mut self.rows[q * size..q * size + active];
-            row.fill(0.0);
-            self.s[q * p..q * p + q].fill(0.0);
+            let row = &mut self.rows[q * stride..q * stride + width];
+            let output = model.output(q, &h.z, &h.z);
+            self.output[q] = output;
             if !has(reading.valid, q) {
+                row.fill(0.0);
+                self.s[q * p..q * p + q].fill(0.0);
                 self.r[q] = 0.0;
                 self.s[q * p + q] = 1.0;
                 continue;
             }
             let noise = reading.noise[q];
             let k = fault + q;
-            let c = &model.c[q * n..(q + 1) * n];
-            let f = &model.f[q * d..(q + 1) * d];
-            let output = model.output_offset[q] + dot(c, &h.z[..n]) + dot(f, &h.z[n..n + d]);
             let (scale, slot) = kinds.weights(q, output, h.z[k], bias);
-            if scale != 0.0 {
-                for (j, &factor) in c.iter().enumerate() {
-                    axpy(row, scale * factor, &h.cov[j * size..j * size + active]);
-                }
-                for (j, &factor) in f.iter().enumerate() {
-                    if factor != 0.0 {
-                        axpy(
-                            row,
-                            scale * factor,
-                            &h.cov[(n + j) * size..(n + j) * size + active],
-                        );
-                    }
-                }
-            }
+            let seen = match scale != 0.0 {
+                true => model.outputs.row(q),
+                false => &[],
+            };
+            let terms = seen.iter().map(|&(at, factor)| (at, scale * factor));
+            combine(row, &h.cov, stride, terms);
             if slot != 0.0 {
-                axpy(row, slot, &h.cov[k * size..k * size + active]);
+                add_row(row, slot, &h.cov[k * stride..k * stride + width]);
             }
             self.r[q] = reading.y[q]
                 - if has(kinds.scaled, q) {
@@ -156,21 +171,19 @@ impl Innovation {
                     scale * output + slot * h.z[k]
                 };
             self.weights[q] = [scale, slot];
-            let row = &self.rows[q * size..q * size + active];
-            for j in 0..=q {
-                let mut sum = 0.0;
+            let covariances = &mut self.s[q * p..=q * p + q];
+            for (j, (sum, &[scale, slot])) in covariances.iter_mut().zip(&self.weights).enumerate()
+            {
+                *sum = 0.0;
                 if has(reading.valid, j) {
-                    let [scale, slot] = self.weights[j];
                     if scale != 0.0 {
-                        sum = scale
-                            * (dot(&model.c[j * n..(j + 1) * n], &row[..n])
-                                + dot(&model.f[j * d..(j + 1) * d], &row[n..n + d]));
+                        let [states, waves] = model.outputs.parts(j);
+                        *sum = scale * (sparse_dot(states, row) + sparse_dot(waves, row));
                     }
                     if slot != 0.0 {
-                        sum += slot * row[fault + j];
+                        *sum += slot * row[fault + j];
                     }
                 }
-                self.s[q * p + j] = sum;
             }
             self.s[q * p + q] += noise * noise;
         }
@@ -255,10 +268,10 @@ impl Hypothesis {
     }
     /// Nothing but the start.
     pub fn new(layout: Layout) -> Self {
-        let size = layout.size();
+        let stride = layout.stride();
         Self {
-            z: vec![0.0; size],
-            cov: vec![0.0; size * size],
+            z: vec![0.0; stride],
+            cov: vec![0.0; layout.size() * stride],
             before: vec![0.0; layout.n],
             additive: 0,
             stuck: 0,
@@ -300,12 +313,12 @@ impl Hypothesis {
 
     /// Forgets entry `k` and opens it with `variance` around `mean`.
     pub fn open(&mut self, k: usize, mean: f64, variance: f64) {
-        let size = self.z.len();
-        self.cov[k * size..(k + 1) * size].fill(0.0);
-        for row in self.cov.chunks_exact_mut(size) {
+        let stride = self.z.len();
+        self.cov[k * stride..(k + 1) * stride].fill(0.0);
+        for row in self.cov.chunks_exact_mut(stride) {
             row[k] = 0.0;
         }
-        self.cov[k * size + k] = variance;
+        self.cov[k * stride + k] = variance;
         self.z[k] = mean;
     }
 
@@ -314,266 +327,239 @@ impl Hypothesis {
         if !seen.sound {
             return;
         }
-        let (p, size) = (layout.p, layout.size());
+        let (p, stride) = (layout.p, layout.stride());
         let active = self.active(layout, bias);
+        let width = padded(active);
+        // The rows of `L^-1 C P`.
         for i in 0..p {
-            let (done, rest) = seen.rows.split_at_mut(i * size);
-            let row = &mut rest[..active];
-            for j in 0..i {
-                axpy(row, -seen.s[i * p + j], &done[j * size..j * size + active]);
+            let (done, rest) = seen.rows.split_at_mut(i * stride);
+            let row = &mut rest[..width];
+            for (&factor, other) in seen.s[i * p..].iter().zip(done.chunks_exact(stride)) {
+                add_row(row, -factor, &other[..width]);
             }
             let scale = 1.0 / seen.s[i * p + i];
             row.iter_mut().for_each(|v| *v *= scale);
-            let white = seen.white[i];
-            axpy(&mut self.z[..active], white, row);
-            for k in 0..active {
-                let factor = -row[k];
-                if factor != 0.0 {
-                    axpy(&mut self.cov[k * size..k * size + active], factor, row);
-                }
-            }
+            add_row(&mut self.z[..width], seen.white[i], row);
         }
         for v in &mut self.z {
             *v = bounded(*v);
         }
+        let rows = &seen.rows[..p * stride];
+        subtract_squares(&mut self.cov, rows, stride, active, width);
     }
 
-    /// One sample on under the input `u` (m), which moved by `du` (m). `scratch` holds n x N.
-    #[allow(clippy::too_many_arguments)]
-    pub fn advance(
-        &mut self,
-        layout: Layout,
-        model: &ModeModel,
-        settings: &Settings,
-        noise: &[f64],
-        rotation: &[(f64, f64)],
-        bias: bool,
-        u: &[f64],
-        du: &[f64],
-        scratch: &mut [f64],
-    ) {
-        let Layout { n, m, p, d, .. } = layout;
-        let (size, load, gain, fault) =
-            (layout.size(), layout.load(), layout.gain(), layout.fault());
-        let active = self.active(layout, bias);
-        let loads = layout.loads();
+    /// One sample on. `scratch` holds n rows of the covariance.
+    pub fn advance(&mut self, step: &Step<'_>, scratch: &mut [f64]) {
+        let active = self.active(step.layout, step.bias);
+        self.drift(step, scratch);
+        self.propagate(step, active, scratch);
+        self.move_state(step, scratch);
+        self.rotate(step, active);
+        self.wander(step);
+        self.limit(step, active);
+    }
+
+    /// The model's error acts as a load that moves as the state and the input move; loads, gain errors
+    /// and the disturbance wander.
+    fn drift(&mut self, step: &Step<'_>, scratch: &mut [f64]) {
+        let Step {
+            layout,
+            model,
+            settings,
+            ..
+        } = *step;
+        let (stride, load, gain) = (layout.stride(), layout.load(), layout.gain());
         let error = if self.loose {
             settings.changed_error
         } else {
             settings.model_error
         };
         let error = error * error;
-        // The model's error acts as a load that moves as the state and the input move.
-        let (moved, _) = scratch.split_at_mut(n);
+        let moved = &mut scratch[..layout.n];
         for ((out, before), &x) in moved.iter_mut().zip(&mut self.before).zip(&self.z) {
             let step = x - *before;
             *out = step * step;
             *before = x;
         }
-        for i in 0..n {
+        let from = load + layout.state_load();
+        for (i, k) in (from..gain).enumerate() {
             let mut sum = 0.0;
-            for (&a, &s) in model.a[i * n..(i + 1) * n].iter().zip(moved.iter()) {
-                sum += a * a * s;
+            for &(at, a) in &model.motion.parts(i)[0] {
+                sum += a * a * moved[at];
             }
-            for (&b, &s) in model.b[i * m..(i + 1) * m].iter().zip(du) {
+            for &(at, b) in model.by_gain.row(i) {
+                let s = step.moved[at - gain];
                 sum += b * b * s * s;
             }
-            let k = load + layout.state_load() + i;
-            self.cov[k * size + k] += error * sum;
+            self.cov[k * stride + k] += error * sum;
         }
-        for (k, wander) in (load..gain).zip(&model.load_walk) {
-            self.cov[k * size + k] += wander * wander;
+        for (k, growth) in (load..).zip(&model.growth) {
+            self.cov[k * stride + k] += growth;
         }
-        for k in gain..fault {
-            self.cov[k * size + k] += settings.gain_walk * settings.gain_walk;
-        }
-        for pair in 0..d / 2 {
-            let angle = settings.angles[pair % settings.angles.len()];
-            let k = n + 2 * pair;
-            let size_squared =
-                settings.disturbance_size[2 * pair] * settings.disturbance_size[2 * pair];
+        for (pair, &(angle, least)) in step.waves.iter().enumerate() {
+            let k = layout.n + 2 * pair;
             let amplitude = self.z[k] * self.z[k] + self.z[k + 1] * self.z[k + 1];
-            let step = settings.period_error * angle;
-            let variance = step * step * amplitude + 1e-8 * size_squared;
+            let variance = angle * angle * amplitude + least;
             for k in [k, k + 1] {
-                self.cov[k * size + k] += variance;
+                self.cov[k * stride + k] += variance;
             }
         }
-        if bias {
-            for q in 0..p {
+        if step.bias {
+            for q in 0..layout.p {
                 let mut sum = 0.0;
-                for (&c, &s) in model.c[q * n..(q + 1) * n].iter().zip(moved.iter()) {
-                    sum += c * c * s;
+                for &(at, c) in &model.outputs.parts(q)[0] {
+                    sum += c * c * moved[at];
                 }
-                let k = fault + q;
-                self.cov[k * size + k] += error * sum;
+                let k = layout.fault() + q;
+                self.cov[k * stride + k] += error * sum;
             }
         }
-        // Rows of F P that belong to x.
-        for i in 0..n {
-            let row = &mut scratch[i * size..i * size + active];
-            row.fill(0.0);
-            for (j, &factor) in model.a[i * n..(i + 1) * n].iter().enumerate() {
-                axpy(row, factor, &self.cov[j * size..j * size + active]);
-            }
-            for (j, &factor) in model.e[i * d..(i + 1) * d].iter().enumerate() {
-                if factor != 0.0 {
-                    axpy(
-                        row,
-                        factor,
-                        &self.cov[(n + j) * size..(n + j) * size + active],
-                    );
-                }
-            }
-            for (k, &factor) in (load..gain).zip(&model.g[i * loads..(i + 1) * loads]) {
-                if factor != 0.0 {
-                    axpy(row, factor, &self.cov[k * size..k * size + active]);
-                }
-            }
-            for (j, (&b, &u)) in model.b[i * m..(i + 1) * m].iter().zip(u).enumerate() {
-                let factor = b * u;
-                if factor != 0.0 {
-                    axpy(
-                        row,
-                        factor,
-                        &self.cov[(gain + j) * size..(gain + j) * size + active],
-                    );
-                }
-            }
-        }
-        // Their products with F'.
-        for i in 0..n {
-            let row = &scratch[i * size..i * size + active];
-            for j in 0..=i {
-                let mut sum = dot(&row[..n], &model.a[j * n..(j + 1) * n])
-                    + dot(&row[n..n + d], &model.e[j * d..(j + 1) * d])
-                    + dot(&row[load..gain], &model.g[j * loads..(j + 1) * loads]);
-                for ((&r, &b), &u) in row[gain..fault]
-                    .iter()
-                    .zip(&model.b[j * m..(j + 1) * m])
-                    .zip(u)
-                {
-                    sum += r * b * u;
-                }
-                self.cov[i * size + j] = sum;
-                self.cov[j * size + i] = sum;
-            }
-            for k in n..active {
-                self.cov[i * size + k] = row[k];
-                self.cov[k * size + i] = row[k];
-            }
-            let k = i * size + i;
-            self.cov[k] += 1e-12 * settings.start_elsewhere[i] * settings.start_elsewhere[i];
-        }
-        // The state.
-        for i in 0..n {
-            let mut sum = model.state_offset[i]
-                + dot(&model.g[i * loads..(i + 1) * loads], &self.z[load..gain])
-                + dot(&model.a[i * n..(i + 1) * n], &self.z[..n])
-                + dot(&model.e[i * d..(i + 1) * d], &self.z[n..n + d]);
-            for ((&b, &u), &g) in model.b[i * m..(i + 1) * m]
-                .iter()
-                .zip(u)
-                .zip(&self.z[gain..fault])
-            {
-                sum += b * u * (1.0 + g);
-            }
-            scratch[i] = bounded(sum);
-        }
-        self.z[..n].copy_from_slice(&scratch[..n]);
-        self.rotate(layout, rotation, active);
-        let share = if self.convinced && !settings.trusts_model() {
-            settings.fault_walk
-        } else {
-            settings.drift_walk
-        };
-        for q in 0..p {
-            let k = fault + q;
-            if has(self.additive, q) {
-                self.cov[k * size + k] += share * share * noise[q] * noise[q];
-            }
-            if has(self.scaled, q) {
-                self.cov[k * size + k] += 1e-6;
-            }
-        }
-        self.limit(layout, model, settings, active);
     }
 
-    fn rotate(&mut self, layout: Layout, rotation: &[(f64, f64)], active: usize) {
-        let size = layout.size();
-        for (h, &(c, s)) in rotation.iter().enumerate() {
-            let k = layout.n + 2 * h;
+    /// `F P F'` but for the turning of the disturbance, in the rows of the plant's state.
+    fn propagate(&mut self, step: &Step<'_>, active: usize, scratch: &mut [f64]) {
+        let Step { layout, model, .. } = *step;
+        let (n, stride, gain) = (layout.n, layout.stride(), layout.gain());
+        let width = padded(active);
+        for i in 0..n {
+            let row = &mut scratch[i * stride..i * stride + width];
+            let gains = model.by_gain.row(i).iter();
+            let gains = gains.map(|&(at, b)| (at, b * step.u[at - gain]));
+            let terms = model.motion.row(i).iter().copied().chain(gains);
+            combine(row, &self.cov, stride, terms);
+        }
+        let rows = scratch.chunks_exact(stride).take(n);
+        for (i, row) in rows.clone().enumerate() {
+            self.cov[i * stride + n..i * stride + width].copy_from_slice(&row[n..width]);
+        }
+        for j in 0..n {
+            let ([a, e, g], gains) = (model.motion.parts(j), model.by_gain.row(j));
+            for (i, row) in rows.clone().enumerate().skip(j) {
+                let mut sum = sparse_dot(a, row) + sparse_dot(e, row) + sparse_dot(g, row);
+                for &(at, b) in gains {
+                    sum += row[at] * b * step.u[at - gain];
+                }
+                self.cov[i * stride + j] = sum;
+                self.cov[j * stride + i] = sum;
+            }
+            let start = step.settings.start_elsewhere[j];
+            self.cov[j * stride + j] += 1e-12 * start * start;
+        }
+    }
+
+    /// The next state of the plant.
+    fn move_state(&mut self, step: &Step<'_>, scratch: &mut [f64]) {
+        let Step { layout, model, .. } = *step;
+        let next = &mut scratch[..layout.n];
+        for (i, (next, offset)) in next.iter_mut().zip(&model.state_offset).enumerate() {
+            let [a, e, g] = model.motion.parts(i).each_ref();
+            let [a, e, g] = [a, e, g].map(|part| sparse_dot(part, &self.z));
+            let mut sum = offset + g + a + e;
+            for &(at, b) in model.by_gain.row(i) {
+                sum += b * step.u[at - layout.gain()] * (1.0 + self.z[at]);
+            }
+            *next = bounded(sum);
+        }
+        self.z[..layout.n].copy_from_slice(next);
+    }
+
+    /// Faults wander.
+    fn wander(&mut self, step: &Step<'_>) {
+        if self.accused() == 0 {
+            return;
+        }
+        let (stride, fault) = (step.layout.stride(), step.layout.fault());
+        let share = if self.convinced && !step.settings.trusts_model() {
+            step.settings.fault_walk
+        } else {
+            step.settings.drift_walk
+        };
+        for (q, noise) in step.noise.iter().enumerate() {
+            let k = fault + q;
+            if has(self.additive, q) {
+                self.cov[k * stride + k] += share * share * noise * noise;
+            }
+            if has(self.scaled, q) {
+                self.cov[k * stride + k] += 1e-6;
+            }
+        }
+    }
+
+    /// The disturbance turns; then what stands below the rows of plant state and disturbance is made
+    /// their mirror image.
+    fn rotate(&mut self, step: &Step<'_>, active: usize) {
+        let layout = step.layout;
+        let stride = layout.stride();
+        let (first, last) = (layout.n, layout.load());
+        for (h, &(c, s)) in step.rotation.iter().enumerate() {
+            let k = first + 2 * h;
             let (a, b) = (self.z[k], self.z[k + 1]);
             self.z[k] = c * a + s * b;
             self.z[k + 1] = c * b - s * a;
-            let (above, below) = self.cov.split_at_mut((k + 1) * size);
-            for (a, b) in above[k * size..k * size + active]
-                .iter_mut()
-                .zip(&mut below[..active])
-            {
-                let (x, y) = (*a, *b);
-                *a = c * x + s * y;
-                *b = c * y - s * x;
+            let (above, below) = self.cov.split_at_mut((k + 1) * stride);
+            turn((c, s), &mut above[k * stride..], &mut below[..stride]);
+            for row in self.cov.chunks_exact_mut(stride).take(last) {
+                if let [x, y] = &mut row[k..k + 2] {
+                    (*x, *y) = (c * *x + s * *y, c * *y - s * *x);
+                }
             }
-            for row in self.cov.chunks_exact_mut(size).take(active) {
-                let (x, y) = (row[k], row[k + 1]);
-                row[k] = c * x + s * y;
-                row[k + 1] = c * y - s * x;
-            }
-            let mean = 0.5 * (self.cov[k * size + k + 1] + self.cov[(k + 1) * size + k]);
-            self.cov[k * size + k + 1] = mean;
-            self.cov[(k + 1) * size + k] = mean;
+            let mean = 0.5 * (self.cov[k * stride + k + 1] + self.cov[(k + 1) * stride + k]);
+            self.cov[k * stride + k + 1] = mean;
+            self.cov[(k + 1) * stride + k] = mean;
         }
+        mirror(&mut self.cov, stride, last, active, last);
+        mirror(&mut self.cov, stride, first, last, first);
     }
 
     /// Keeps every variance below what is thought possible.
-    fn limit(&mut self, layout: Layout, model: &ModeModel, settings: &Settings, active: usize) {
-        let Layout { n, d, .. } = layout;
-        let (size, load, gain, fault) =
-            (layout.size(), layout.load(), layout.gain(), layout.fault());
-        for k in 0..active {
-            let most = if k < n {
-                1e8 * settings.start_elsewhere[k] * settings.start_elsewhere[k]
-            } else if k < n + d {
-                settings.disturbance_size[k - n] * settings.disturbance_size[k - n]
-            } else if k < gain {
-                let size = model.load_size[k - load];
-                4.0 * (size * size).max(self.z[k] * self.z[k])
-            } else if k < fault {
-                settings.gain_error * settings.gain_error
-            } else if has(self.accused(), k - fault) {
-                2.0 * settings.fault_size[k - fault] * settings.fault_size[k - fault]
+    fn limit(&mut self, step: &Step<'_>, active: usize) {
+        let Step { layout, model, .. } = *step;
+        let (load, gain, fault) = (layout.load(), layout.gain(), layout.fault());
+        for (k, &most) in model.most[..fault].iter().enumerate() {
+            let most = if (load..gain).contains(&k) {
+                4.0 * most.max(self.z[k] * self.z[k])
             } else {
-                model.bias[k - fault] * settings.model_error * settings.model_error
+                most
             };
-            let variance = self.cov[k * size + k];
-            if (0.0..=most).contains(&variance) {
-                continue;
-            }
-            if variance.is_nan() || variance < 0.0 {
-                // Cancellation has spoilt it: start anew.
-                let fresh = if k < n {
-                    settings.start_elsewhere[k] * settings.start_elsewhere[k]
-                } else {
-                    most
-                };
-                let mean = self.z[k];
-                self.open(k, mean, fresh);
-                continue;
-            }
-            let scale = if variance.is_finite() {
-                libm::sqrt(most / variance)
-            } else {
-                0.0
-            };
-            for j in 0..active {
-                let v = self.cov[k * size + j] * scale;
-                let v = if v.is_finite() { v } else { 0.0 };
-                self.cov[k * size + j] = v;
-                self.cov[j * size + k] = v;
-            }
-            self.cov[k * size + k] = most;
+            self.keep_below(step, active, k, most);
         }
+        for k in fault..active {
+            let size = step.settings.fault_size[k - fault];
+            let most = match has(self.accused(), k - fault) {
+                true => 2.0 * size * size,
+                false => model.most[k],
+            };
+            self.keep_below(step, active, k, most);
+        }
+    }
+
+    #[inline]
+    fn keep_below(&mut self, step: &Step<'_>, active: usize, k: usize, most: f64) {
+        let stride = step.layout.stride();
+        let variance = self.cov[k * stride + k];
+        if (0.0..=most).contains(&variance) {
+            return;
+        }
+        if variance.is_nan() || variance < 0.0 {
+            // Cancellation has spoilt it: start anew.
+            let start = step.settings.start_elsewhere.get(k);
+            let fresh = start.map_or(most, |start| start * start);
+            self.open(k, self.z[k], fresh);
+            return;
+        }
+        let scale = if variance.is_finite() {
+            libm::sqrt(most / variance)
+        } else {
+            0.0
+        };
+        for v in &mut self.cov[k * stride..k * stride + active] {
+            let scaled = *v * scale;
+            *v = if scaled.is_finite() { scaled } else { 0.0 };
+        }
+        for j in 0..active {
+            self.cov[j * stride + k] = self.cov[k * stride + j];
+        }
+        self.cov[k * stride + k] = most;
     }
 
     /// Loads jump, and input gains with them, with effect on the state at once.
@@ -586,33 +572,33 @@ impl Hypothesis {
         gain_error: f64,
     ) {
         let Layout { n, m, .. } = layout;
-        let (size, load, gain) = (layout.size(), layout.load(), layout.gain());
+        let (stride, load, gain) = (layout.stride(), layout.load(), layout.gain());
         let loads = layout.loads();
         for k in jump.loads.clone() {
             let variance = model.load_size[k] * model.load_size[k];
             let at = load + k;
-            self.cov[at * size + at] += variance;
+            self.cov[at * stride + at] += variance;
             for i in 0..n {
                 let left = variance * model.g[i * loads + k];
                 if left == 0.0 {
                     continue;
                 }
-                self.cov[i * size + at] += left;
-                self.cov[at * size + i] += left;
+                self.cov[i * stride + at] += left;
+                self.cov[at * stride + i] += left;
                 for j in 0..n {
-                    self.cov[i * size + j] += left * model.g[j * loads + k];
+                    self.cov[i * stride + j] += left * model.g[j * loads + k];
                 }
             }
         }
         for k in jump.gains.clone() {
             let variance = gain_error * gain_error;
-            self.cov[(gain + k) * size + gain + k] += variance;
+            self.cov[(gain + k) * stride + gain + k] += variance;
             for i in 0..n {
                 let left = model.b[i * m + k] * u[k];
-                self.cov[i * size + gain + k] += variance * left;
-                self.cov[(gain + k) * size + i] += variance * left;
+                self.cov[i * stride + gain + k] += variance * left;
+                self.cov[(gain + k) * stride + i] += variance * left;
                 for j in 0..n {
-                    self.cov[i * size + j] += variance * left * (model.b[j * m + k] * u[k]);
+                    self.cov[i * stride + j] += variance * left * (model.b[j * m + k] * u[k]);
                 }
             }
         }

@@ -25,7 +25,7 @@ pub use model::Layout;
 use super::super::parameters::Hypotheses;
 use crate::compensation::is_measurement;
 use competition::{Candidates, QUIET};
-use hypothesis::Innovation;
+use hypothesis::{Innovation, Step};
 use linear::dot;
 use model::ModeModel;
 use own_run::OwnRun;
@@ -62,6 +62,8 @@ pub struct Bank {
     modes: Vec<ModeModel>,
     settings: Hypotheses,
     rotation: Vec<(f64, f64)>,
+    /// Of each pair of the disturbance: the error of its angle, and the least growth of its variance.
+    waves: Vec<(f64, f64)>,
     prices: Prices,
     /// Noise deviation of each sensor over its threshold (p).
     noise_per_threshold: Vec<f64>,
@@ -256,7 +258,8 @@ impl Bank {
         }
         state.mode = Some(mode);
         let bias = self.output_error();
-        state.own.read(layout, model, &state.slots[state.best].z);
+        let z = &state.slots[state.best].z;
+        state.own.read(model, &self.settings, z, reading.noise);
         for slot in state.live.slots() {
             let h = &state.slots[slot];
             let seen = &mut state.seen[slot];
@@ -290,12 +293,11 @@ impl Bank {
         }
         state.first = false;
         self.learn_noise(state, reading);
-        let z = &state.slots[state.best].z;
-        state.own.learn(layout, model, &self.settings, z);
-        let displaced = self.displaced(state, state.best, model, reading, DISPLACED);
-        state.apart = self.displaced(state, state.best, model, reading, APART);
-        state.suspect |= displaced & !state.slots[state.best].accused();
         self.conclude(state, model, reading);
+        let displaced = state.own.displaced(&state.expected, DISPLACED);
+        state.apart = state.own.displaced(&state.expected, APART);
+        state.own.learn(&state.expected);
+        state.suspect |= displaced & !state.slots[state.best].accused();
     }
 
     /// Noise of the sensors that are believed, from the innovations of the leading hypothesis: the mean
@@ -328,7 +330,7 @@ impl Bank {
     /// Another mode: what the model misses, and what a load does, may differ.
     fn enter(&self, state: &mut BankState, mode: usize) {
         let Layout { n, m, .. } = self.layout;
-        let size = self.layout.size();
+        let stride = self.layout.stride();
         let load = self.layout.load() + self.layout.state_load();
         let model = &self.modes[mode];
         let error = self.settings.model_error * self.settings.model_error;
@@ -337,7 +339,7 @@ impl Bank {
             let mean = dot(&h.z[load..load + n], &h.z[load..load + n]) / n.max(1) as f64;
             for i in 0..n {
                 let off = h.z[i] - model.x0[i];
-                h.cov[i * size + i] += error * off * off;
+                h.cov[i * stride + i] += error * off * off;
                 let mut sum = 0.0;
                 for j in 0..n {
                     let v = model.a[i * n + j] * (h.z[j] - model.x0[j]);
@@ -348,7 +350,7 @@ impl Bank {
                     sum += v * v;
                 }
                 let k = load + i;
-                h.cov[k * size + k] += error * sum + 2.0 * (h.z[k] * h.z[k]).max(mean);
+                h.cov[k * stride + k] += error * sum + 2.0 * (h.z[k] * h.z[k]).max(mean);
             }
         }
     }
@@ -395,37 +397,11 @@ impl Bank {
         }
     }
 
-    /// Sensors that loads have moved away from the model's own run, by more than the root of `limit`
-    /// deviations.
-    fn displaced(
-        &self,
-        state: &BankState,
-        slot: usize,
-        model: &ModeModel,
-        reading: Reading<'_>,
-        limit: f64,
-    ) -> Sensors {
-        let z = &state.slots[slot].z;
-        let mut set = 0;
-        for q in 0..self.layout.p.min(64) {
-            let noise = reading.noise[q];
-            let own = state.own.covariance(model, &self.settings, q, q);
-            let off = state.own.offset(self.layout, model, z, q);
-            if off * off > limit * (noise * noise + own) {
-                set |= 1 << q;
-            }
-        }
-        set
-    }
-
     fn conclude(&self, state: &mut BankState, model: &ModeModel, reading: Reading<'_>) {
-        let layout = self.layout;
-        let Layout { n, p, d, .. } = layout;
+        let p = self.layout.p;
         let h = &state.slots[state.best];
-        for q in 0..p {
-            state.expected[q] = model.output_offset[q]
-                + dot(&model.c[q * n..(q + 1) * n], &h.z[..n])
-                + dot(&model.f[q * d..(q + 1) * d], &h.z[n..n + d]);
+        for (q, expected) in state.expected.iter_mut().enumerate() {
+            *expected = model.output(q, &h.z, &h.z);
         }
         let all = if p >= 64 { u64::MAX } else { (1 << p) - 1 };
         state.accused = h.accused() | (all & !reading.valid);
@@ -467,7 +443,7 @@ impl Bank {
     /// (p) of the readings. Spoils the state.
     pub fn differentiate(&self, state: &mut BankState, dy: &[f64]) {
         let Layout { n, p, d, .. } = self.layout;
-        let size = self.layout.size();
+        let stride = self.layout.stride();
         let Some(model) = self.modes.get(state.mode.unwrap_or(0)) else {
             return;
         };
@@ -480,7 +456,7 @@ impl Bank {
                 seen.white[q] = dy.get(q).copied().unwrap_or(0.0);
             }
             linear::solve(&seen.s, p, &mut seen.white);
-            for (row, &white) in seen.rows.chunks_exact(size).zip(&seen.white) {
+            for (row, &white) in seen.rows.chunks_exact(stride).zip(&seen.white) {
                 linear::axpy(&mut h.z, white, row);
             }
         }
@@ -500,19 +476,20 @@ impl Bank {
         }
         let z = &state.slots[state.best].z;
         let next = &mut state.scratch[..self.layout.n];
-        state.own.advance(self.layout, model, z, u, next);
+        state.own.advance(self.layout.m, model, z, u, next);
+        let step = Step {
+            layout: self.layout,
+            model,
+            settings: &self.settings,
+            noise: &state.noise,
+            rotation: &self.rotation,
+            waves: &self.waves,
+            bias: self.output_error(),
+            u,
+            moved: &state.moved,
+        };
         for slot in state.live.slots() {
-            state.slots[slot].advance(
-                self.layout,
-                model,
-                &self.settings,
-                &state.noise,
-                &self.rotation,
-                self.output_error(),
-                u,
-                &state.moved,
-                &mut state.scratch,
-            );
+            state.slots[slot].advance(&step, &mut state.scratch);
         }
     }
 }

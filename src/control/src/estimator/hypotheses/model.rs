@@ -1,6 +1,6 @@
 //! What the estimator knows beforehand: the plant per mode, and sizes and rates of what may happen.
 
-use super::linear::{multiply, multiply_transposed};
+use super::linear::{Sparse, multiply, multiply_transposed, padded, sparse_dot};
 use alloc::vec;
 use alloc::vec::Vec;
 use core::ops::Range;
@@ -56,6 +56,10 @@ impl Layout {
     pub const fn size(self) -> usize {
         self.fault() + self.p
     }
+    /// The length of a padded row of the covariance.
+    pub const fn stride(self) -> usize {
+        padded(self.size())
+    }
 }
 
 /// One mode, row after row: `x+ = A x + B u + a + E_d d + G l + B diag(u) g`, `y = C x + c + F_d d`.
@@ -83,8 +87,6 @@ pub struct ModeModel {
     pub g: Vec<f64>,
     /// Standard deviation of a jump of each load.
     pub load_size: Vec<f64>,
-    /// How far each load wanders per sample.
-    pub load_walk: Vec<f64>,
     /// What jumps of loads may do: all of them at once first, then each source on its own.
     pub jumps: Vec<Jump>,
     /// `C B` (p x m).
@@ -93,6 +95,17 @@ pub struct ModeModel {
     pub bias: Vec<f64>,
     /// `B^+` (m x n): the input that would act as a load does.
     pub b_inverse: Vec<f64>,
+    /// `A`, `E_d` and `G` side by side: what moves the state, by entries of the joint state.
+    pub motion: Sparse<3>,
+    /// `B`, by the gain errors in the joint state.
+    pub by_gain: Sparse<1>,
+    /// How the variance of each load and of each gain error grows per sample.
+    pub growth: Vec<f64>,
+    /// The greatest variance of each entry of the joint state: of a load the square of its size, of a
+    /// fault that of a healthy sensor.
+    pub most: Vec<f64>,
+    /// `C` and `F_d` side by side: the outputs, by entries of the joint state.
+    pub outputs: Sparse<2>,
 }
 
 impl ModeModel {
@@ -106,12 +119,15 @@ impl ModeModel {
         e: Vec<f64>,
         f: Vec<f64>,
         point: (&[f64], &[f64], &[f64]),
-        (g, load_size, load_walk): (Vec<f64>, Vec<f64>, Vec<f64>),
-        bias: Vec<f64>,
+        (g, load_size, growth): (Vec<f64>, Vec<f64>, Vec<f64>),
+        (bias, most): (Vec<f64>, Vec<f64>),
         b_inverse: Vec<f64>,
     ) -> Self {
         let Layout { n, m, p, .. } = layout;
         let (x0, u0, y0) = point;
+        let motion = Sparse::new(n, [(0, &a), (n, &e), (layout.load(), &g)]);
+        let by_gain = Sparse::new(n, [(layout.gain(), &b)]);
+        let outputs = Sparse::new(p, [(0, &c), (n, &f)]);
         let mut state_offset = x0.to_vec();
         for (i, value) in state_offset.iter_mut().enumerate() {
             for j in 0..n {
@@ -167,11 +183,22 @@ impl ModeModel {
             output_offset,
             g,
             load_size,
-            load_walk,
+            growth,
+            most,
             jumps,
             cb,
             bias,
             b_inverse,
+            motion,
+            by_gain,
+            outputs,
         }
+    }
+
+    /// Output `q` at the plant's state `x` (n) and the disturbance in `z`.
+    #[inline]
+    pub fn output(&self, q: usize, x: &[f64], z: &[f64]) -> f64 {
+        let [states, waves] = self.outputs.parts(q);
+        self.output_offset[q] + sparse_dot(states, x) + sparse_dot(waves, z)
     }
 }

@@ -1,7 +1,8 @@
 //! The model's own run: what the plant would do under the commands alone, and how far that is right.
 
-use super::linear::dot;
-use super::model::{Layout, ModeModel};
+use super::hypothesis::Sensors;
+use super::linear::{dot, sparse_dot};
+use super::model::ModeModel;
 use crate::kernel::bounded;
 use crate::parameters::Hypotheses as Settings;
 use alloc::vec;
@@ -22,6 +23,10 @@ pub(super) struct OwnRun {
     pub x: Vec<f64>,
     /// Outputs (p).
     pub y: Vec<f64>,
+    /// Their variance that the model's error allows (p).
+    bound: Vec<f64>,
+    /// Variance of a reading around them (p).
+    spread: Vec<f64>,
     /// Running mean of the squared error of each output (p).
     error: Vec<f64>,
     /// Running mean of what the model's error allows, as a variance (p).
@@ -29,7 +34,7 @@ pub(super) struct OwnRun {
 }
 
 crate::state!(OwnRun {
-    parts: [x, y, error, allowed],
+    parts: [x, y, bound, spread, error, allowed],
     constants: [],
     counters: []
 });
@@ -42,48 +47,44 @@ impl OwnRun {
         Self {
             x: model.x0.clone(),
             y: vec![0.0; model.bias.len()],
+            bound: vec![0.0; model.bias.len()],
+            spread: vec![0.0; model.bias.len()],
             error: allowed.clone(),
             allowed,
         }
     }
 
-    /// Outputs of the sample, with the disturbance as `z` (N) knows it.
-    pub fn read(&mut self, layout: Layout, model: &ModeModel, z: &[f64]) {
-        let Layout { n, d, .. } = layout;
-        for (q, y) in self.y.iter_mut().enumerate() {
-            *y = model.output_offset[q]
-                + dot(&model.c[q * n..(q + 1) * n], &self.x)
-                + dot(&model.f[q * d..(q + 1) * d], &z[n..n + d]);
+    /// Outputs of the sample, with the disturbance as `z` (N) knows it, and how far readings with this
+    /// `noise` (p) may be from them.
+    pub fn read(&mut self, model: &ModeModel, settings: &Settings, z: &[f64], noise: &[f64]) {
+        for (q, noise) in noise.iter().enumerate().take(self.y.len()) {
+            self.y[q] = model.output(q, &self.x, z);
+            self.bound[q] = self.allowed(model, settings, q, q);
+            self.spread[q] = noise * noise + self.share(q) * self.bound[q];
         }
     }
 
     /// One sample on under the input `u` (m), with the disturbance as `z` (N) knows it. `next` holds n.
-    pub fn advance(
-        &mut self,
-        layout: Layout,
-        model: &ModeModel,
-        z: &[f64],
-        u: &[f64],
-        next: &mut [f64],
-    ) {
-        let Layout { n, m, d, .. } = layout;
+    pub fn advance(&mut self, m: usize, model: &ModeModel, z: &[f64], u: &[f64], next: &mut [f64]) {
         for (i, next) in next.iter_mut().enumerate() {
-            let mut sum = model.state_offset[i]
-                + dot(&model.a[i * n..(i + 1) * n], &self.x)
-                + dot(&model.e[i * d..(i + 1) * d], &z[n..n + d]);
+            let [own, waves, _] = model.motion.parts(i);
+            let mut sum = model.state_offset[i] + sparse_dot(own, &self.x) + sparse_dot(waves, z);
             sum += dot(&model.b[i * m..(i + 1) * m], u);
             *next = bounded(sum);
         }
         self.x.copy_from_slice(next);
     }
 
-    /// How far a hypothesis with the state `z` (N) moves output `q` away from the run.
-    pub fn offset(&self, layout: Layout, model: &ModeModel, z: &[f64], q: usize) -> f64 {
-        let Layout { n, d, .. } = layout;
-        let output = model.output_offset[q]
-            + dot(&model.c[q * n..(q + 1) * n], &z[..n])
-            + dot(&model.f[q * d..(q + 1) * d], &z[n..n + d]);
-        output - self.y[q]
+    /// Sensors that a hypothesis with these `outputs` (p) moves away from the run, by more than the root of
+    /// `limit` deviations.
+    pub fn displaced(&self, outputs: &[f64], limit: f64) -> Sensors {
+        let own = self.y.iter().zip(&self.spread);
+        let mut set = 0;
+        for (q, (output, (alone, spread))) in outputs.iter().zip(own).enumerate().take(64) {
+            let off = output - alone;
+            set |= Sensors::from(off * off > limit * spread) << q;
+        }
+        set
     }
 
     /// Variance of state `k` that the model's error allows.
@@ -98,13 +99,12 @@ impl OwnRun {
         libm::sqrt(self.share(q) * self.share(j)) * self.allowed(model, settings, q, j)
     }
 
-    /// Learns the error, given the leading hypothesis's state `z` (N).
-    pub fn learn(&mut self, layout: Layout, model: &ModeModel, settings: &Settings, z: &[f64]) {
-        for q in 0..layout.p {
-            let off = self.offset(layout, model, z, q);
-            let allowed = self.allowed(model, settings, q, q);
+    /// Learns the error, given the `outputs` (p) that the leading hypothesis expects.
+    pub fn learn(&mut self, outputs: &[f64]) {
+        for (q, output) in outputs.iter().enumerate() {
+            let off = output - self.y[q];
             self.error[q] += (bounded(off * off) - self.error[q]) / MEMORY;
-            self.allowed[q] += (bounded(allowed) - self.allowed[q]) / MEMORY;
+            self.allowed[q] += (bounded(self.bound[q]) - self.allowed[q]) / MEMORY;
         }
     }
 

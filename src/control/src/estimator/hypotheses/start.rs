@@ -72,7 +72,8 @@ fn left_inverse(b: &[f64], n: usize, m: usize) -> Vec<f64> {
     out
 }
 
-/// What loads do to the states (n x loads), how large they are, and how far they wander: on each input, each channel of the
+/// What loads do to the states (n x loads), how large they are, and how their variances and those
+/// of the gain errors grow per sample: on each input, each channel of the
 /// disturbance, each state.
 fn loads(
     layout: Layout,
@@ -98,7 +99,9 @@ fn loads(
     }
     let mut walks: Vec<f64> = sizes.iter().map(|size| settings.load_walk * size).collect();
     walks[m..m + s].copy_from_slice(&settings.disturbance_walk);
-    (rows(&effect), sizes, walks)
+    walks.resize(walks.len() + m, settings.gain_walk);
+    let growth = walks.iter().map(|walk| walk * walk).collect();
+    (rows(&effect), sizes, growth)
 }
 
 fn model(
@@ -113,8 +116,18 @@ fn model(
         let parts = row.iter().zip(&settings.state_size);
         0.25 * parts.map(|(c, size)| (c * size) * (c * size)).sum::<f64>()
     };
-    let bias = c.chunks_exact(n).map(spread).collect();
+    let bias: Vec<f64> = c.chunks_exact(n).map(spread).collect();
     let inverse = left_inverse(&b, n, m);
+    let loads = loads(layout, mode, channels, settings);
+    let error = settings.model_error;
+    let starts = settings.start_elsewhere.iter();
+    let most = starts
+        .map(|size| 1e8 * size * size)
+        .chain(settings.disturbance_size.iter().map(|size| size * size))
+        .chain(loads.1.iter().map(|size| size * size))
+        .chain((0..m).map(|_| settings.gain_error * settings.gain_error))
+        .chain(bias.iter().map(|bias| bias * error * error))
+        .collect();
     let harmonics = settings.angles.len();
     ModeModel::new(
         layout,
@@ -124,10 +137,20 @@ fn model(
         waves(&channels.e, harmonics),
         waves(&channels.f, harmonics),
         (&mode.x0, &mode.u0, &mode.y0),
-        loads(layout, mode, channels, settings),
-        bias,
+        loads,
+        (bias, most),
         inverse,
     )
+}
+
+/// Per pair of the disturbance's `d` states: the error of its angle, and the least growth of its variance.
+fn waves_of(settings: &Hypotheses, d: usize) -> Vec<(f64, f64)> {
+    let sizes = settings.disturbance_size.iter().step_by(2);
+    let angles = settings.angles.iter().cycle();
+    let pairs = angles.zip(sizes).take(d / 2);
+    pairs
+        .map(|(angle, size)| (settings.period_error * angle, 1e-8 * (size * size)))
+        .collect()
 }
 
 impl Bank {
@@ -160,6 +183,7 @@ impl Bank {
                 .map(|(mode, channels)| model(layout, mode, channels, settings))
                 .collect(),
             rotation: (0..disturbances).flat_map(turn).collect(),
+            waves: waves_of(settings, d),
             prices: Prices {
                 fault: ln(settings.fault_rate),
                 stuck: ln(settings.stuck_rate),
@@ -188,13 +212,13 @@ impl Bank {
     pub fn start(&self, mode: usize) -> BankState {
         let layout = self.layout;
         let Layout { n, m, p, d, .. } = layout;
-        let size = layout.size();
+        let stride = layout.stride();
         let settings = &self.settings;
         let model = &self.modes[mode];
         let mut first = Hypothesis::new(layout);
         first.z[..n].copy_from_slice(&model.x0);
         first.before.copy_from_slice(&model.x0);
-        let mut set = |k: usize, deviation: f64| first.cov[k * size + k] = deviation * deviation;
+        let mut set = |k: usize, deviation: f64| first.cov[k * stride + k] = deviation * deviation;
         for i in 0..n {
             set(i, settings.start[i]);
         }
@@ -214,7 +238,7 @@ impl Bank {
             seen: vec![Innovation::new(layout); SLOTS],
             live: Live::ONE,
             candidates: Candidates::new(p, model.jumps.len()),
-            scratch: vec![0.0; n.max(1) * size],
+            scratch: vec![0.0; n.max(1) * stride],
             trial: Innovation::new(layout),
             mode: None,
             u: model.u0.clone(),
