@@ -85,26 +85,14 @@ pub fn dot(left: &[f64], right: &[f64]) -> f64 {
 /// Inner product in four sums side by side, for long vectors: no addition waits for the one before
 /// it. Its order is fixed too.
 pub fn long_dot(left: &[f64], right: &[f64]) -> f64 {
+    let (left, left_rest) = left.as_chunks::<4>();
+    let (right, right_rest) = right.as_chunks::<4>();
     let mut sums = [0.0; 4];
-    let mut add = |l: &[f64; 4], r: &[f64; 4]| {
+    for (l, r) in left.iter().zip(right) {
         for (sum, (l, r)) in sums.iter_mut().zip(l.iter().zip(r)) {
             *sum += l * r;
         }
-    };
-    let (left, left_rest) = left.as_chunks::<4>();
-    let (right, right_rest) = right.as_chunks::<4>();
-    let (left, left_last) = left.as_chunks::<4>();
-    let (right, right_last) = right.as_chunks::<4>();
-    for ([a, b, c, d], [e, f, g, h]) in left.iter().zip(right) {
-        add(a, e);
-        add(b, f);
-        add(c, g);
-        add(d, h);
     }
-    left_last
-        .iter()
-        .zip(right_last)
-        .for_each(|(l, r)| add(l, r));
     (sums[0] + sums[2]) + (sums[1] + sums[3]) + dot(left_rest, right_rest)
 }
 
