@@ -3,8 +3,8 @@
 use crate::{Interface, SignalInfo};
 use ftc_design::{Design, Signal};
 
-/// Name of the design in an FMU's `resources` folder.
-pub const DESIGN_FILE: &str = "design.json";
+/// Name of the design in an FMU's `resources` folder: MessagePack, the record as a map of its fields.
+pub const DESIGN_FILE: &str = "design.msgpack";
 
 /// The bytes of [`DESIGN_FILE`]: what the binaries read of a design, which is all but its proof.
 ///
@@ -15,7 +15,7 @@ pub fn write_design(design: &Design) -> Result<Vec<u8>, String> {
         proof: None,
         ..design.clone()
     };
-    serde_json::to_vec(&running).map_err(|why| why.to_string())
+    rmp_serde::to_vec_named(&running).map_err(|why| why.to_string())
 }
 
 /// Reads the bytes of [`DESIGN_FILE`] and checks that all sizes agree.
@@ -24,7 +24,7 @@ pub fn write_design(design: &Design) -> Result<Vec<u8>, String> {
 /// One sentence that names the file and what is wrong in it.
 pub fn read_design(bytes: &[u8]) -> Result<Design, String> {
     let in_file = |why: &dyn std::fmt::Display| format!("{DESIGN_FILE}: {why}");
-    let design: Design = serde_json::from_slice(bytes).map_err(|why| in_file(&why))?;
+    let design: Design = rmp_serde::from_slice(bytes).map_err(|why| in_file(&why))?;
     design.check().map_err(|why| in_file(&why))?;
     Ok(design)
 }

@@ -1,28 +1,51 @@
-"""Reading a finished design: the JSON record that the command line ships inside each FMU."""
+"""Reading a finished design: the record that the command line ships inside each FMU."""
 
 from __future__ import annotations
 
 import json
+import struct
 import zipfile
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
+import msgpack
 import numpy as np
 
 if TYPE_CHECKING:
     from pathlib import Path
 
-RESOURCE = "resources/design.json"
+RESOURCE = "resources/design.msgpack"
 CERTIFICATE = "resources/certificate.json"
 
 
-def load(path: Path) -> dict:
-    """Returns the record in a `.json` file, or the one zipped into an FMU."""
-    if path.suffix == ".fmu":
-        with zipfile.ZipFile(path) as archive:
-            design = json.loads(archive.read(RESOURCE))
-            return design | {"proof": json.loads(archive.read(CERTIFICATE))["proof"]}
-    return json.loads(path.read_text())
+def load(fmu: Path) -> dict:
+    """Returns the record zipped into an FMU, with what proves it."""
+    with zipfile.ZipFile(fmu) as archive:
+        design = _with_matrices(msgpack.unpackb(archive.read(RESOURCE)))
+        return design | {"proof": json.loads(archive.read(CERTIFICATE))["proof"]}
+
+
+def _with_matrices(value: object) -> object:
+    """Returns a value in which every byte string has become the rows of the matrix that it holds."""
+    match value:
+        case bytes():
+            return _matrix(value).tolist()
+        case list():
+            return [_with_matrices(item) for item in value]
+        case dict():
+            return {key: _with_matrices(item) for key, item in value.items()}
+    return value
+
+
+def _matrix(data: bytes) -> np.ndarray:
+    """Reads rows, columns and the entries column after column, or those of the upper triangle."""
+    rows, columns = struct.unpack_from("<II", data)
+    entries = np.frombuffer(data, "<f8", offset=8)
+    if len(entries) == rows * columns:
+        return entries.reshape((columns, rows)).T
+    matrix = np.zeros((columns, rows))
+    matrix[np.tril_indices(rows)] = entries
+    return matrix.T
 
 
 @dataclass(frozen=True)

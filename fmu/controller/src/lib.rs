@@ -1,6 +1,6 @@
 //! The controller FMU: a [`Slave`] over [`ftc_control`].
 //!
-//! The binary is generic; `resources/design.json` makes it the controller of one plant. It works
+//! The binary is generic; `resources/design.msgpack` makes it the controller of one plant. It works
 //! when a tick begins: it samples the measurements and publishes the command at once, so a master
 //! that steps the controller before the plant adds no delay to the loop.
 

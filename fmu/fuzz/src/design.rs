@@ -1,7 +1,8 @@
-//! Forged designs: numbers exchanged, text damaged, the guid made to fit.
+//! Forged designs: numbers exchanged, bytes damaged, the guid made to fit.
 
 use fmu_abi::{Slave, Values};
 use fmu_host::model::example;
+use model_description::{DESIGN_FILE, write_design};
 use libfuzzer_sys::arbitrary::{self, Arbitrary};
 use std::path::Path;
 use std::sync::LazyLock;
@@ -14,7 +15,7 @@ static FOLDER: LazyLock<String> = LazyLock::new(|| {
     folder.to_str().unwrap().to_string()
 });
 
-/// What is done to the text.
+/// What is done to the design: to its JSON, from which it is made again, or to its bytes.
 #[derive(Arbitrary, Clone, Debug)]
 pub enum Edit {
     /// The number at this place (of all numbers) becomes another.
@@ -45,6 +46,7 @@ fn number(text: &str, which: u16) -> std::ops::Range<usize> {
     start..start + length
 }
 
+/// Changes the JSON; damaged bytes come later.
 fn edit(text: &mut String, edit: &Edit) {
     match *edit {
         Edit::Number(which, value) => {
@@ -64,14 +66,25 @@ fn edit(text: &mut String, edit: &Edit) {
             let comma = usize::from(text[range.end..].starts_with(','));
             text.replace_range(range.start..range.end + comma, "");
         }
-        Edit::Byte(at, value) => {
-            let at = usize::from(at) % text.len().max(1);
-            let letter = char::from(value).to_string();
-            if text.is_char_boundary(at) && text.is_char_boundary(at + 1) {
-                text.replace_range(at..=at, &letter);
-            }
+        Edit::Byte(..) => {}
+    }
+}
+
+/// The bytes of the edited design; none where the JSON is no design any more.
+fn forged(edits: &[Edit]) -> Option<Vec<u8>> {
+    let mut text = HONEST.clone();
+    for change in edits {
+        edit(&mut text, change);
+    }
+    let design = serde_json::from_str(&text).ok()?;
+    let mut bytes = write_design(&design).ok()?;
+    for change in edits {
+        if let Edit::Byte(at, value) = *change {
+            let at = usize::from(at) % bytes.len();
+            bytes[at] = value;
         }
     }
+    Some(bytes)
 }
 
 /// Loads the design; if it is taken, a few ticks must go well.
@@ -97,10 +110,9 @@ fn run<S: Slave>(identifier: &str, bytes: &[u8]) {
 
 /// Forges a design and hands it to a slave, whose binary is called `identifier`.
 pub fn forge<S: Slave>(identifier: &str, edits: &[Edit]) {
-    let mut text = HONEST.clone();
-    for change in edits.iter().take(8) {
-        edit(&mut text, change);
-    }
-    std::fs::write(Path::new(&*FOLDER).join("design.json"), &text).unwrap();
-    run::<S>(identifier, text.as_bytes());
+    let Some(bytes) = forged(&edits[..edits.len().min(8)]) else {
+        return;
+    };
+    std::fs::write(Path::new(&*FOLDER).join(DESIGN_FILE), &bytes).unwrap();
+    run::<S>(identifier, &bytes);
 }

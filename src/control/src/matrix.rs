@@ -1,4 +1,9 @@
-//! A dense matrix as plain data: entries column after column, serialised as a list of rows.
+//! A dense matrix as plain data: entries column after column; serialised as a list of rows, in binary
+//! formats as bytes.
+
+mod binary;
+
+pub(crate) use binary::upper_triangle;
 
 use alloc::vec;
 use alloc::vec::Vec;
@@ -156,6 +161,10 @@ impl Serialize for Row<'_> {
 
 impl Serialize for Matrix {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        if !serializer.is_human_readable() {
+            let entries = self.entries.iter().copied();
+            return binary::serialize(self.shape(), entries, serializer);
+        }
         let mut rows = serializer.serialize_seq(Some(self.rows))?;
         for row in 0..self.rows {
             rows.serialize_element(&Row(self, row))?;
@@ -166,6 +175,9 @@ impl Serialize for Matrix {
 
 impl<'de> Deserialize<'de> for Matrix {
     fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        if !deserializer.is_human_readable() {
+            return deserializer.deserialize_bytes(binary::Reader::<false>);
+        }
         let rows = Vec::<Vec<f64>>::deserialize(deserializer)?;
         Self::try_from_rows(&rows).map_err(D::Error::custom)
     }

@@ -1,6 +1,6 @@
 //! Everything the controller needs to know before its first tick: plain, serialisable data.
 
-use crate::matrix::Matrix;
+use crate::matrix::{Matrix, upper_triangle};
 use alloc::string::String;
 use alloc::vec::Vec;
 use serde::{Deserialize, Serialize};
@@ -300,6 +300,7 @@ pub struct Predictor {
     /// `Y1 U1^+` (p x m j).
     pub response: Matrix,
     /// `R` of the QR factorisation of `U1'` (m j x m j, upper triangular): gives the leverage.
+    #[serde(with = "upper_triangle")]
     pub factor: Matrix,
     /// Standard deviation of the residual on the database, per sensor (p).
     pub deviation: Vec<f64>,

@@ -14,7 +14,7 @@ use std::io::{Cursor, Write};
 use std::sync::OnceLock;
 use zip::write::SimpleFileOptions;
 
-const DESIGN: &str = "resources/design.json";
+const DESIGN: &str = "resources/design.msgpack";
 const CERTIFICATE: &str = "resources/certificate.json";
 const DESCRIPTION: &str = "modelDescription.xml";
 
@@ -97,14 +97,25 @@ impl Exported {
         Self { bench, files }
     }
 
-    /// One file with its JSON changed.
+    /// Design or certificate with its contents, as JSON, changed.
     fn change(&mut self, name: &str, change: impl Fn(&mut Value)) {
-        let mut value: Value = serde_json::from_slice(&self.files[name]).unwrap();
+        let bytes = &self.files[name];
+        let mut value: Value = match name {
+            DESIGN => serde_json::to_value(model_description::read_design(bytes).unwrap()),
+            _ => serde_json::from_slice(bytes),
+        }
+        .unwrap();
         let before = value.clone();
         change(&mut value);
         assert_ne!(value, before, "nothing was changed in {name}");
-        self.files
-            .insert(name.into(), serde_json::to_vec(&value).unwrap());
+        let bytes = match name {
+            DESIGN => {
+                let design = serde_json::from_value(value).unwrap();
+                model_description::write_design(&design).unwrap()
+            }
+            _ => serde_json::to_vec(&value).unwrap(),
+        };
+        self.files.insert(name.into(), bytes);
     }
 
     /// Makes fingerprints fit the design again, as a careful forger would.
@@ -409,6 +420,10 @@ fn what_is_missing_or_no_fmu_of_ours() {
         let code = if name == DESIGN { 1 } else { 2 };
         exported.refused(name, code, &[name]);
     }
+    let mut longer = Exported::new(SOUND);
+    longer.files.get_mut(DESIGN).unwrap().push(0);
+    longer.seal();
+    longer.refused("a byte more", 2, &[DESIGN, "more than a design"]);
     let bench = Bench::new(SOUND);
     for (path, word) in [
         (FILE, "this is no FMU"),

@@ -132,7 +132,15 @@ impl Fmu {
     /// Which FMU it is, and its design.
     pub(crate) fn design(&self) -> Result<(&'static Kind, Design), Refusal> {
         let bytes = self.resource()?;
-        Ok((self.kind(bytes)?, parse(RESOURCE, bytes)?))
+        let kind = self.kind(bytes)?;
+        let refused = |what: &str| Unreadable(format!("{RESOURCE} {what}: export it again"));
+        let design = model_description::read_design(bytes)
+            .map_err(|why| refused(&format!("cannot be read ({why})")))?;
+        // Nothing but what is looked at may stand in it.
+        match model_description::write_design(&design) {
+            Ok(written) if written == *bytes => Ok((kind, design)),
+            _ => Err(refused("holds more than a design, or is written otherwise")),
+        }
     }
 
     /// The binary for this machine.

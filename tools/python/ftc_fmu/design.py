@@ -57,7 +57,7 @@ class Design:
         return float(self.document["sample_time"])
 
     def record(self) -> dict[str, Any]:
-        """Returns the design as it ships in an FMU, `resources/design.json`: every gain and matrix."""
+        """Returns the design with every gain and matrix, and under `proof` what proves it."""
         return json.loads(self.core.record())[0]
 
     def to_toml(self) -> str:

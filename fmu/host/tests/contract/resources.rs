@@ -5,14 +5,15 @@
 use crate::Pair;
 use fmu_host::model::location;
 use fmu_host::{Instance, Model};
-use ftc_design::FORMAT;
+use ftc_design::Design;
+use model_description::{DESIGN_FILE, read_design, write_design};
 use std::fs;
 
 /// What the log says when the resource of binary 0 or 1 is `bytes`, under the model's own guid.
 fn refusal(pair: &Pair, which: usize, bytes: Option<&[u8]>) -> String {
     let folder = tempfile::tempdir().unwrap();
     if let Some(bytes) = bytes {
-        fs::write(folder.path().join("design.json"), bytes).unwrap();
+        fs::write(folder.path().join(DESIGN_FILE), bytes).unwrap();
     }
     let model = &pair.models[which];
     sentence(Instance::made(
@@ -33,7 +34,7 @@ fn sentence(made: Result<Instance, String>) -> String {
 }
 
 fn design(model: &Model) -> Vec<u8> {
-    fs::read(model.folder.path().join("design.json")).unwrap()
+    fs::read(model.folder.path().join(DESIGN_FILE)).unwrap()
 }
 
 #[test]
@@ -55,36 +56,37 @@ fn missing_empty_truncated_and_damaged_designs_are_refused() {
     }
 }
 
-/// The text with another number under a key: one that asks for all the memory there is.
-fn with_size(text: &str, key: &str) -> String {
-    let key = format!("\"{key}\":");
-    let (before, after) = text.split_once(&key).unwrap();
-    let rest = after.trim_start_matches(|c: char| c.is_ascii_digit());
-    assert!(rest.len() < after.len());
-    format!("{before}{key}1000000000000000{rest}")
-}
-
 /// A design that fits its guid, as somebody who forges both could make it.
 #[test]
 fn designs_of_another_layout_or_of_other_sizes_are_refused() {
     let pair = Pair::load();
-    let text = String::from_utf8(design(&pair.models[0])).unwrap();
+    let bytes = design(&pair.models[0]);
+    let honest = read_design(&bytes).unwrap();
+    let forged = |change: &dyn Fn(&mut Design)| {
+        let mut forged = honest.clone();
+        change(&mut forged);
+        write_design(&forged).unwrap()
+    };
+    // The last four: an empty map, nested lists, bytes and a map that announce more than there is.
     let forgeries = [
-        text.replacen(&format!("\"format\":{FORMAT}"), "\"format\":0", 1),
-        text.replacen("\"tracked\":[0,1]", "\"tracked\":[0,7]", 1),
-        text.replacen("\"noise\":[0.005,0.005]", "\"noise\":[0.005]", 1),
-        with_size(&text, "response_length"),
-        with_size(&text, "window"),
-        "{}".to_string(),
-        "[".repeat(1_000_000),
+        forged(&|design| design.format = 0),
+        forged(&|design| design.controller.feedback.tracked = vec![0, 7]),
+        forged(&|design| design.scenario.noise.truncate(1)),
+        forged(&|design| design.controller.estimator.response_length = 1_000_000_000_000_000),
+        forged(&|design| design.controller.estimator.window = 1_000_000_000_000_000),
+        bytes[..bytes.len() / 2].to_vec(),
+        vec![0x80],
+        vec![0x91; 1_000_000],
+        vec![0xC6, 0xFF, 0xFF, 0xFF, 0xFF],
+        vec![0xDF, 0xFF, 0xFF, 0xFF, 0xFF],
     ];
     for forged in forgeries {
-        assert!(forged != text);
+        assert!(forged != bytes);
         let binaries = ["ftc_controller", "ftc_plant"];
         for (which, binary) in binaries.into_iter().enumerate() {
             let folder = tempfile::tempdir().unwrap();
-            fs::write(folder.path().join("design.json"), &forged).unwrap();
-            let guid = model_description::guid(binary, forged.as_bytes());
+            fs::write(folder.path().join(DESIGN_FILE), &forged).unwrap();
+            let guid = model_description::guid(binary, &forged);
             let location = location(folder.path());
             let made = Instance::made(
                 pair.functions()[which],
