@@ -250,6 +250,7 @@ pub fn state_based(channel: Channel, noise: f64) -> ControllerParameters {
         &plant,
         &signals,
         vec![noise.max(1e-3 / 6.0); dims.outputs],
+        &[],
         Some(&known),
     );
     parameters.estimator.method = EstimatorMethod::Observer;

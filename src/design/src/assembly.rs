@@ -3,7 +3,7 @@
 use super::commissioning::{self, Database, LONGEST_RESPONSE, RecordedDisturbance};
 use super::harmonics;
 pub use super::harmonics::KnownDisturbance;
-use super::hypotheses::HypothesesSpec;
+use super::hypotheses::{self, HypothesesSpec};
 use super::matrices::{dense, plain};
 use super::{
     ControlSpec, ControllerDesign, Design, DesignError, FORMAT, Failure, ObserverSpec,
@@ -47,14 +47,13 @@ pub struct Request {
 impl Request {
     /// A request in which all but plant, signals and experiment has its default. The reference acts on the
     /// command at once, a mode switch is not bumpless, an estimated fault is taken out by a virtual
-    /// sensor; for the rest see [`ControlSpec::new`], [`ObserverSpec::beside`] and
-    /// [`EstimatorSpec::suited`].
+    /// sensor; for the rest see [`ControlSpec::new`], [`ObserverSpec::beside`] and [`EstimatorSpec`].
     pub fn new(name: &str, plant: SwitchedPlant, signals: Signals, scenario: Scenario) -> Self {
         let control = ControlSpec::new(&signals.scaling());
         Self {
             name: name.into(),
             signals,
-            estimator: EstimatorSpec::suited(&plant.modes),
+            estimator: EstimatorSpec::default(),
             plant,
             true_plant: TruePlant::default(),
             bumpless: false,
@@ -93,7 +92,7 @@ pub struct EstimatorSpec {
 impl Default for EstimatorSpec {
     fn default() -> Self {
         Self {
-            method: EstimatorMethod::Reference,
+            method: EstimatorMethod::Observer,
             response_length: None,
             database: DatabaseSource::Commission,
             threshold: Threshold::Sigmas(6.0),
@@ -102,21 +101,6 @@ impl Default for EstimatorSpec {
             adapt: false,
             disturbance: None,
             hypotheses: HypothesesSpec::default(),
-        }
-    }
-}
-
-impl EstimatorSpec {
-    /// The defaults for a plant: the paper's predictor, and the state-based method where a mode
-    /// integrates, is slow or unstable and so has no response that ends.
-    pub fn suited(modes: &[ftc_plant::Mode]) -> Self {
-        let method = match commissioning::response_length(modes) {
-            Ok(_) => EstimatorMethod::Reference,
-            Err(_) => EstimatorMethod::Observer,
-        };
-        Self {
-            method,
-            ..Self::default()
         }
     }
 }
@@ -317,8 +301,10 @@ fn estimator(request: &Request, dims: Dimensions) -> Result<Estimator, RequestEr
     let hypotheses = state_based.then(|| {
         let known = spec.disturbance.as_ref();
         let noise = sensor_noise(&request.scenario.noise, &thresholds);
+        let (plant, signals) = (&request.plant, &request.signals);
+        let reach = hypotheses::reach(plant, &request.control.tracked, &request.scenario);
         spec.hypotheses
-            .settings(&request.plant, &request.signals, noise, known)
+            .settings(plant, signals, noise, &reach, known)
     });
     Ok(Estimator {
         method: spec.method,

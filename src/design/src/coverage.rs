@@ -262,7 +262,9 @@ fn hypotheses_fit(design: &Design) -> bool {
         amplitude: hypotheses::amplitude_is_known(found).then(|| found.disturbance_load.clone()),
     });
     let noise = assembly::sensor_noise(&design.scenario.noise, &estimator.thresholds);
-    let mut derived = spec.settings(plant, &design.signals, noise, known.as_ref());
+    let tracked = &design.controller.feedback.tracked;
+    let reach = hypotheses::reach(plant, tracked, &design.scenario);
+    let mut derived = spec.settings(plant, &design.signals, noise, &reach, known.as_ref());
     let turns = derived.angles.iter().zip(&found.angles);
     let same_turns = turns.clone().all(|(a, b)| (a - b).abs() <= 1e-12 * a.abs());
     derived.angles.clone_from(&found.angles);

@@ -4,7 +4,7 @@ use crate::harmonics::KnownDisturbance;
 use crate::matrices::plain;
 use crate::{Signal, Signals};
 use ftc_control::parameters::{Ambiguous, Channels, Hypotheses};
-use ftc_plant::{Mode, SwitchedPlant};
+use ftc_plant::{Mode, Scenario, SwitchedPlant};
 
 /// What may be asked of the state-based estimator; the rest follows from the design.
 #[derive(Clone, Debug, PartialEq)]
@@ -78,16 +78,22 @@ const START: f64 = 3e-3;
 
 impl HypothesesSpec {
     /// The estimator's sizes and rates for `plant` with these signals and this `noise` of the sensors (p), under
-    /// the disturbance that is `known`.
+    /// the disturbance that is `known`. An output whose reference leaves the operating point by more than the
+    /// nominal value has a `reach` (p, as [`reach`] finds it) that stands in for it.
     pub fn settings(
         &self,
         plant: &SwitchedPlant,
         signals: &Signals,
         noise: Vec<f64>,
+        reach: &[f64],
         known: Option<&KnownDisturbance>,
     ) -> Hypotheses {
         let scaling = signals.scaling();
-        let outputs = &signals.outputs;
+        let mut outputs = signals.outputs.clone();
+        for (output, reach) in outputs.iter_mut().zip(reach) {
+            output.nominal = output.nominal.max(*reach);
+        }
+        let outputs = &outputs;
         let amplitude = known
             .and_then(|known| known.amplitude.clone())
             .filter(|sizes| sizes.iter().all(|&size| size > 0.0));
@@ -141,6 +147,25 @@ impl HypothesesSpec {
             ambiguous: self.ambiguous,
         }
     }
+}
+
+/// How far the scenario's references take each output (p) from its operating points; 0 for the others.
+pub(crate) fn reach(plant: &SwitchedPlant, tracked: &[usize], scenario: &Scenario) -> Vec<f64> {
+    let mut reach = vec![0.0; plant.dimensions().outputs];
+    for (&output, signal) in tracked.iter().zip(&scenario.reference) {
+        let levels = (0..scenario.steps).map(|tick| signal.at(tick, plant.sample_time));
+        let [low, high] = levels.fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], level| {
+            [level.min(low), level.max(high)]
+        });
+        for mode in &plant.modes {
+            let point = mode.operating_point.y[output];
+            let far = (high - point).max(point - low);
+            if far.is_finite() {
+                reach[output] = far.max(reach[output]);
+            }
+        }
+    }
+    reach
 }
 
 /// Whether these sizes and rates were made for a disturbance of known amplitude.

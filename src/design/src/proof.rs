@@ -1,15 +1,14 @@
 //! What proves a design, beside the numbers that the controller runs on.
 //!
 //! Gains, observer, tracked outputs, latency and resonators stand in the record's controller and nowhere
-//! else; [`Design::synthesis`] puts both together again, and that is what is proved.
+//! else; [`Design::synthesis`](crate::Design::synthesis) puts both together again, and that is what is proved.
 
 use super::matrices::dense;
 use super::{
-    ControlCertificate, ControlSpec, ControllerDesign, Design, DwellTime, LostCertificate,
-    Lyapunov, ModeGains, Objective, ObserverCertificate, ObserverDesign, ObserverSpec, RunningLoop,
-    StateFeedback, Synthesis,
+    ControlCertificate, ControlSpec, DwellTime, LostCertificate, Lyapunov, ModeGains, Objective,
+    ObserverCertificate, ObserverDesign, ObserverSpec, RunningLoop, StateFeedback, Synthesis,
 };
-use ftc_control::parameters::FeedbackGains;
+use ftc_control::parameters::{self, FeedbackGains};
 use serde::{Deserialize, Serialize};
 
 /// Claims of a design and what proves them, together with plant and controller.
@@ -104,8 +103,12 @@ impl From<Synthesis> for Proof {
 
 impl Proof {
     /// What is proved: these claims of this controller.
-    fn of(self, controller: &ControllerDesign) -> Synthesis {
-        let (feedback, control) = (&controller.feedback, self.state_feedback);
+    pub(crate) fn of(
+        self,
+        feedback: &parameters::StateFeedback,
+        observer: &parameters::Observer,
+    ) -> Synthesis {
+        let control = self.state_feedback;
         let gains = |gains: &FeedbackGains| ModeGains {
             state_feedback: dense(&gains.state_feedback),
             integral: dense(&gains.integral),
@@ -133,7 +136,7 @@ impl Proof {
             },
             observer: ObserverDesign {
                 spec: self.observer.spec,
-                observer: controller.observer.clone(),
+                observer: observer.clone(),
                 spectral_radius: self.observer.spectral_radius,
                 dwell: self.observer.dwell,
                 certificate: self.observer.certificate,
@@ -141,13 +144,5 @@ impl Proof {
             },
             running_loop: self.running_loop,
         }
-    }
-}
-
-impl Design {
-    /// The gains and the observer that run, with what proves them; none where they were not made by
-    /// synthesis.
-    pub fn synthesis(&self) -> Option<Synthesis> {
-        Some(self.proof.clone()?.of(&self.controller))
     }
 }

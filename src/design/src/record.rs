@@ -1,7 +1,7 @@
 //! The design as a record: plain data, everything the exporter ships and the FMUs read.
 
-use super::Proof;
 use super::matrices::mode_models;
+use super::{Proof, Synthesis};
 use ftc_control::parameters::{
     Compensation, Estimator, EstimatorMethod, Limits, Observer, StateFeedback,
 };
@@ -140,6 +140,13 @@ pub enum RecordError {
 }
 
 impl Design {
+    /// The gains and the observer that run, with what proves them; none where they were not made by
+    /// synthesis.
+    pub fn synthesis(&self) -> Option<Synthesis> {
+        let running = &self.controller;
+        Some(self.proof.clone()?.of(&running.feedback, &running.observer))
+    }
+
     /// The data of the on-line controller.
     pub fn parameters(&self) -> ControllerParameters {
         let controller = self.controller.clone();

@@ -119,7 +119,8 @@ fn a_reference_far_outside_the_database() {
         format!(
             "name = \"far\"\nsample_time = 1.0\n[[mode]]\nA = [[0.8]]\nB = [[0.2]]\nC = [[1.0]]\n\
              [signals]\ninputs = [{{ name = \"valve\", nominal = {nominal} }}]\n\
-             [controller]\ndecay = 0.9\n[scenario]\nsteps = 400\nnoise = 0.005\n\
+             [controller]\ndecay = 0.9\n[estimator]\nmethod = \"reference\"\n\
+             [scenario]\nsteps = 400\nnoise = 0.005\n\
              reference = [{{ kind = \"steps\", points = [[0, {reference}], [150, 0]] }}]\n"
         )
     };

@@ -22,7 +22,7 @@ pub(crate) fn estimator(
     dims: Dimensions,
     logs: &Logs,
 ) -> Result<EstimatorSpec, String> {
-    let usual = EstimatorSpec::suited(&logs.plant.modes);
+    let usual = EstimatorSpec::default();
     let database = database(given, logs)?.unwrap_or(usual.database);
     let method = match (given.method, &database) {
         // Only this method reads a log.

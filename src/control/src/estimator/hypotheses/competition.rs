@@ -3,7 +3,7 @@
 use super::hypothesis::{Hypothesis, Kinds, Reading, Sensors, has};
 use super::linear::dot;
 use super::model::{Layout, ModeModel};
-use super::{Bank, BankState, FREEZING, KEEP, Live, RENEWED};
+use super::{APART, Bank, BankState, DISPLACED, FREEZING, KEEP, Live, RENEWED};
 use alloc::vec;
 use alloc::vec::Vec;
 use serde::{Deserialize, Serialize};
@@ -22,6 +22,8 @@ const TOGETHER: f64 = 1.5;
 pub(super) const UNLIKE: f64 = 2.0;
 /// Price of a fault before the first sample: one sensor in a hundred.
 const AT_START: f64 = -4.6;
+/// Variance of loads and input gains that are said to be gone, relative to that of their jumps.
+const REMAINS: f64 = 0.01;
 /// Mean of the relative error of a sensor's wrong gain.
 const SCALE_MEAN: f64 = -0.5;
 /// Its variance.
@@ -182,31 +184,18 @@ impl Bank {
                 convinced,
             });
         }
-        let displaced = state.displaced(&state.seen[slot].output) & reading.valid;
-        if accused == 0 && displaced != 0 && !state.first {
-            if unlikely {
-                let value = score
-                    + self.prices.fault
-                    + self.trial(state, slot, model, reading, Action::Home);
-                state.candidates.add(Candidate {
-                    score: value,
-                    parent: slot,
-                    action: Action::Home,
-                    convinced,
-                });
-            }
-            if self.settings.trusts_model() {
-                let value = self.trial(state, slot, model, reading, Action::Drift(displaced));
-                let square = state.trial.square;
-                if square < QUIET + 2.0 * p as f64 {
-                    state.candidates.add(Candidate {
-                        score: stay.max(score + value) + 1.0,
-                        parent: slot,
-                        action: Action::Drift(displaced),
-                        convinced: true,
-                    });
-                }
-            }
+        if unlikely && !state.first && state.own.displaced(&state.seen[slot].output, APART) != 0 {
+            let value =
+                score + self.prices.fault + self.trial(state, slot, model, reading, Action::Home);
+            state.candidates.add(Candidate {
+                score: value,
+                parent: slot,
+                action: Action::Home,
+                convinced,
+            });
+        }
+        if accused == 0 && !state.first {
+            self.propose_drift(state, slot, model, reading, stay);
         }
         let free = all & !accused & reading.valid;
         let fault_price = if state.first {
@@ -271,7 +260,7 @@ impl Bank {
             if has(free, q) && state.evidence[q] > FREEZING && slot == state.live.first() {
                 let value = score
                     + self.prices.stuck
-                    + state.evidence[q]
+                    + state.evidence_before[q]
                     + self.trial(state, slot, model, reading, Action::Freeze(q));
                 state.candidates.add(Candidate {
                     score: value,
@@ -312,6 +301,41 @@ impl Bank {
                 parent: slot,
                 action: Action::Release(accused),
                 convinced: true,
+            });
+        }
+    }
+
+    /// The sensors that have left the model's own run may have drifted, and no load acts. It is followed
+    /// beside the explanation by loads, so that the end of the drift is recognised; it decides only where
+    /// the model is trusted.
+    fn propose_drift(
+        &self,
+        state: &mut BankState,
+        slot: usize,
+        model: &ModeModel,
+        reading: Reading<'_>,
+        stay: f64,
+    ) {
+        let trusted = self.settings.trusts_model();
+        let limit = if trusted { DISPLACED } else { APART };
+        let set = state.own.displaced(&state.seen[slot].output, limit) & reading.valid;
+        let known =
+            |other: usize| state.slots[other].additive == set && !state.slots[other].convinced;
+        if set == 0 || !trusted && state.live.slots().any(known) {
+            return;
+        }
+        let value = self.trial(state, slot, model, reading, Action::Drift(set));
+        if state.trial.square < QUIET + 2.0 * self.layout.p as f64 {
+            let before = stay - state.seen[slot].likelihood(self.layout.p);
+            state.candidates.add(Candidate {
+                score: if trusted {
+                    stay.max(before + value) + 1.0
+                } else {
+                    stay
+                },
+                parent: slot,
+                action: Action::Drift(set),
+                convinced: trusted,
             });
         }
     }
@@ -435,12 +459,7 @@ impl Bank {
                         if !has(reading.valid, q) || !has(reading.valid, j) {
                             continue;
                         }
-                        let mut sum = 0.0;
-                        for k in 0..n {
-                            sum += model.c[q * n + k]
-                                * model.c[j * n + k]
-                                * self.own_variance(model, &state.own, k);
-                        }
+                        let mut sum = state.own.covariance(model, &self.settings, q, j);
                         if q == j {
                             sum += reading.noise[q] * reading.noise[q];
                             if has(set, q) {
@@ -450,7 +469,7 @@ impl Bank {
                         trial.s[q * p + j] = sum;
                     }
                     trial.r[q] = if has(reading.valid, q) {
-                        reading.y[q] - state.own_output[q]
+                        reading.y[q] - state.own.y[q]
                     } else {
                         0.0
                     };
@@ -495,13 +514,6 @@ impl Bank {
             }
             error * sum
         })
-    }
-
-    /// Variance of entry `k` of the model's own run.
-    pub(super) fn own_variance(&self, model: &ModeModel, own: &[f64], k: usize) -> f64 {
-        let off = self.settings.model_error * (own[k] - model.x0[k]);
-        let start = 3.0 * self.settings.start[k];
-        off * off + start * start
     }
 
     fn sets(&self, h: &Hypothesis, action: Action) -> Kinds {
@@ -676,12 +688,16 @@ impl Bank {
                 }
                 Action::Home | Action::Drift(_) => {
                     for k in 0..n {
-                        let variance = self.own_variance(model, &state.own, k);
-                        child.open(k, state.own[k], variance);
-                        child.before[k] = state.own[k];
+                        let variance = state.own.variance(model, &self.settings, k);
+                        child.open(k, state.own.x[k], variance);
+                        child.before[k] = state.own.x[k];
                     }
                     for (k, size) in model.load_size.iter().enumerate() {
-                        child.open(layout.load() + k, 0.0, 0.01 * size * size);
+                        child.open(layout.load() + k, 0.0, REMAINS * size * size);
+                    }
+                    let gain = self.settings.gain_error;
+                    for k in layout.gain()..fault {
+                        child.open(k, 0.0, REMAINS * gain * gain);
                     }
                     for q in 0..p {
                         if has(child.additive, q) {

@@ -15,6 +15,7 @@ mod competition;
 mod hypothesis;
 mod linear;
 mod model;
+mod own_run;
 mod start;
 
 use alloc::vec::Vec;
@@ -27,6 +28,7 @@ use competition::{Candidates, QUIET};
 use hypothesis::{Innovation, Step};
 use linear::dot;
 use model::ModeModel;
+use own_run::OwnRun;
 use serde::{Deserialize, Serialize};
 
 /// Most hypotheses that stay after a sample.
@@ -35,10 +37,23 @@ const KEEP: usize = 12;
 const SLOTS: usize = 2 * KEEP;
 /// Evidence of a frozen sensor from which it is considered, in log likelihood.
 const FREEZING: f64 = 4.0;
-/// Noise deviations (squared) from which loads are said to have moved an output.
+/// What the very same reading says for a frozen sensor while the model's own run moves, in log likelihood.
+const REPEATS: f64 = 5.0;
+/// Deviations (squared) of the model's own run from which loads are said to have moved an output.
 const DISPLACED: f64 = 36.0;
+/// The same, from which it is considered that they are gone.
+const APART: f64 = 4.0;
 /// Memory of the running misfit: its share that a sample renews.
 const RENEWED: f64 = 0.1;
+/// Variance of a sensor's noise at the start, relative to the design's, and how many samples say so.
+const NOISE_AT_START: f64 = 4.0;
+const NOISE_PRIOR: f64 = 25.0;
+/// Samples over which the noise is estimated afterwards.
+const NOISE_MEMORY: f64 = 300.0;
+/// Largest variance of the noise relative to the design's.
+const MOST_NOISE: f64 = 100.0;
+/// Squared innovation, relative to its variance, beyond which it says nothing more about the noise.
+const OUTLIER: f64 = 9.0;
 
 /// The estimator: immutable, shared by any number of [`BankState`]s.
 #[derive(Clone, Debug)]
@@ -134,18 +149,25 @@ pub struct BankState {
     first: bool,
     /// Noise deviation of each sensor (p).
     noise: Vec<f64>,
-    /// Evidence that a sensor repeats one value, that value's mean, and of how many samples (p each).
+    /// Its variance relative to the design's (p), and how many samples it rests on.
+    noise_ratio: Vec<f64>,
+    noise_samples: f64,
+    /// Evidence that a sensor repeats one value, the same before this sample, that value's mean, and of how
+    /// many samples (p each).
     evidence: Vec<f64>,
+    evidence_before: Vec<f64>,
+    /// The reading that repeats, and the output of the model's own run when it came first (p each).
+    repeated: Vec<f64>,
+    moved_from: Vec<f64>,
     mean: Vec<f64>,
     count: Vec<f64>,
     best: usize,
+    /// Sensors that loads have moved away from the model's own run.
+    apart: Sensors,
     /// Running mean of the leading hypothesis's squared whitened innovation.
     misfit: f64,
-    /// The model's own run under the input alone (n), and its outputs (p).
-    own: Vec<f64>,
-    own_output: Vec<f64>,
-    /// Variance of a reading around these outputs (p).
-    own_spread: Vec<f64>,
+    /// The model's own run under the commands alone.
+    own: OwnRun,
     /// Outputs that the leading hypothesis expects of healthy sensors (p).
     pub expected: Vec<f64>,
     /// What the readings leave unexplained; of an accused sensor its fault (p).
@@ -164,15 +186,34 @@ pub struct BankState {
 
 crate::state!(BankState {
     parts: [
-        slots, seen, candidates, scratch, trial, u, moved, noise, evidence, mean, count, own,
-        own_output, own_spread, expected, residual, load
+        slots,
+        seen,
+        candidates,
+        scratch,
+        trial,
+        u,
+        moved,
+        noise,
+        noise_ratio,
+        evidence,
+        evidence_before,
+        repeated,
+        moved_from,
+        mean,
+        count,
+        own,
+        expected,
+        residual,
+        load
     ],
     constants: [],
     counters: [
         live,
         mode,
         first,
+        noise_samples,
         best,
+        apart,
         misfit,
         accused,
         suspect,
@@ -187,8 +228,10 @@ impl Bank {
     pub fn observe(&self, state: &mut BankState, mode: usize, y: &[f64], thresholds: &[f64]) {
         let mut noise = core::mem::take(&mut state.noise);
         let scales = thresholds.iter().zip(&self.noise_per_threshold);
-        for (deviation, (&threshold, &share)) in noise.iter_mut().zip(scales) {
-            *deviation = (threshold.abs() * share).clamp(1e-150, 1e100);
+        for ((deviation, (&threshold, &share)), &ratio) in
+            noise.iter_mut().zip(scales).zip(&state.noise_ratio)
+        {
+            *deviation = (threshold.abs() * share * libm::sqrt(ratio)).clamp(1e-150, 1e100);
         }
         let mut valid = 0;
         for (q, &value) in y.iter().enumerate().take(Sensors::BITS as usize) {
@@ -215,7 +258,8 @@ impl Bank {
         }
         state.mode = Some(mode);
         let bias = self.output_error();
-        self.run_alone(state, model, reading);
+        let z = &state.slots[state.best].z;
+        state.own.read(model, &self.settings, z, reading.noise);
         for slot in state.live.slots() {
             let h = &state.slots[slot];
             let seen = &mut state.seen[slot];
@@ -235,6 +279,7 @@ impl Bank {
             && state.seen[head].sound
             && state.evidence.iter().all(|&e| e < FREEZING)
             && !state.first
+            && state.apart == 0
             && !(self.settings.trusts_model() && state.suspect != 0);
         if calm {
             state.slots[head].update(layout, &mut state.seen[head], bias);
@@ -247,9 +292,39 @@ impl Bank {
             self.compete(state, model, reading);
         }
         state.first = false;
+        self.learn_noise(state, reading);
         self.conclude(state, model, reading);
-        let displaced = state.displaced(&state.expected);
+        let displaced = state.own.displaced(&state.expected, DISPLACED);
+        state.apart = state.own.displaced(&state.expected, APART);
+        state.own.learn(&state.expected);
         state.suspect |= displaced & !state.slots[state.best].accused();
+    }
+
+    /// Noise of the sensors that are believed, from the innovations of the leading hypothesis: the mean
+    /// of the noise's square given the reading. The design's noise is the least.
+    fn learn_noise(&self, state: &mut BankState, reading: Reading<'_>) {
+        let p = self.layout.p;
+        let (seen, accused) = (&state.seen[state.best], state.slots[state.best].accused());
+        if !seen.sound {
+            return;
+        }
+        state.noise_samples = (state.noise_samples + 1.0).min(NOISE_MEMORY);
+        for q in 0..p {
+            if !has(reading.valid & !accused, q) {
+                continue;
+            }
+            let factor = &seen.s[q * p..=q * p + q];
+            let variance = dot(factor, factor);
+            let noise = reading.noise[q] * reading.noise[q];
+            let share = noise / variance;
+            let square = (seen.r[q] * seen.r[q]).min(OUTLIER * variance);
+            let relative = share * (square / variance) + (1.0 - share);
+            if relative.is_finite() {
+                let ratio = &mut state.noise_ratio[q];
+                *ratio += *ratio * (relative - 1.0) / state.noise_samples;
+                *ratio = ratio.clamp(1.0, MOST_NOISE);
+            }
+        }
     }
 
     /// Another mode: what the model misses, and what a load does, may differ.
@@ -280,24 +355,11 @@ impl Bank {
         }
     }
 
-    /// Outputs of the model's own run, with the disturbance as it is known.
-    fn run_alone(&self, state: &mut BankState, model: &ModeModel, reading: Reading<'_>) {
-        let z = &state.slots[state.best].z;
-        let outputs = state.own_output.iter_mut().zip(&mut state.own_spread);
-        for (q, ((output, spread), noise)) in outputs.zip(reading.noise).enumerate() {
-            *output = model.output(q, &state.own, z);
-            let mut variance = noise * noise;
-            for &(k, c) in &model.outputs.parts(q)[0] {
-                variance += c * c * self.own_variance(model, &state.own, k);
-            }
-            *spread = variance;
-        }
-    }
-
     /// Which sensors repeat one value while the model moves.
     fn watch(&self, state: &mut BankState, head: usize, reading: Reading<'_>) {
         let p = self.layout.p;
         let (h, seen) = (&state.slots[head], &state.seen[head]);
+        state.evidence_before.copy_from_slice(&state.evidence);
         for q in 0..p {
             if !has(reading.valid, q) || has(h.stuck, q) {
                 state.evidence[q] = 0.0;
@@ -306,6 +368,11 @@ impl Bank {
             }
             let y = reading.y[q];
             let variance = reading.noise[q] * reading.noise[q];
+            if y != state.repeated[q] {
+                state.repeated[q] = y;
+                state.moved_from[q] = state.own.y[q];
+            }
+            let moved = state.own.y[q] - state.moved_from[q];
             if state.count[q] == 0.0 {
                 state.mean[q] = y;
                 state.count[q] = 1.0;
@@ -317,7 +384,8 @@ impl Bank {
             let gain = 0.5 * (seen.r[q] * seen.r[q] / s).min(50.0)
                 - 0.5 * off * off / (variance * (1.0 + 1.0 / state.count[q]))
                 - 0.02;
-            state.evidence[q] += gain;
+            let repeats = moved * moved > DISPLACED * variance;
+            state.evidence[q] += if repeats { gain.max(REPEATS) } else { gain };
             if state.evidence[q] <= 0.0 {
                 state.evidence[q] = 0.0;
                 state.mean[q] = y;
@@ -406,17 +474,9 @@ impl Bank {
             *d = new - *old;
             *old = new;
         }
-        let Layout { n, m, .. } = self.layout;
         let z = &state.slots[state.best].z;
-        for i in 0..n {
-            let [own, waves, _] = model.motion.parts(i);
-            let mut sum = model.state_offset[i]
-                + linear::sparse_dot(own, &state.own)
-                + linear::sparse_dot(waves, z);
-            sum += dot(&model.b[i * m..(i + 1) * m], u);
-            state.scratch[i] = crate::kernel::bounded(sum);
-        }
-        state.own.copy_from_slice(&state.scratch[..n]);
+        let next = &mut state.scratch[..self.layout.n];
+        state.own.advance(self.layout.m, model, z, u, next);
         let step = Step {
             layout: self.layout,
             model,
@@ -435,17 +495,6 @@ impl Bank {
 }
 
 impl BankState {
-    /// Sensors that loads have moved away from the model's own run, their `outputs` (p) being expected.
-    fn displaced(&self, outputs: &[f64]) -> Sensors {
-        let own = self.own_output.iter().zip(&self.own_spread);
-        let mut set = 0;
-        for (q, (output, (alone, spread))) in outputs.iter().zip(own).enumerate().take(64) {
-            let off = output - alone;
-            set |= Sensors::from(off * off > DISPLACED * spread) << q;
-        }
-        set
-    }
-
     /// Whether every index in it is one; a state that came as bytes may hold any.
     pub fn sound(&self) -> bool {
         self.live.sound() && self.live.contains(self.best)

@@ -4,7 +4,8 @@ use super::competition::{Candidates, UNLIKE};
 use super::hypothesis::{Hypothesis, Innovation};
 use super::linear::{axpy, factor, solve};
 use super::model::{Layout, ModeModel};
-use super::{Bank, BankState, Live, Prices, SLOTS};
+use super::own_run::OwnRun;
+use super::{Bank, BankState, Live, NOISE_AT_START, NOISE_PRIOR, Prices, SLOTS};
 use crate::matrix::Matrix;
 use crate::parameters::{Channels, Hypotheses, ModeModel as Described};
 use alloc::vec;
@@ -244,14 +245,18 @@ impl Bank {
             moved: vec![0.0; m],
             first: true,
             noise: vec![0.0; p],
+            noise_ratio: vec![NOISE_AT_START; p],
+            noise_samples: NOISE_PRIOR,
             evidence: vec![0.0; p],
+            evidence_before: vec![0.0; p],
+            repeated: vec![0.0; p],
+            moved_from: vec![0.0; p],
             mean: vec![0.0; p],
             count: vec![0.0; p],
             best: 0,
+            apart: 0,
             misfit: p as f64,
-            own: model.x0.clone(),
-            own_output: vec![0.0; p],
-            own_spread: vec![0.0; p],
+            own: OwnRun::new(model, settings),
             expected: vec![0.0; p],
             residual: vec![0.0; p],
             accused: 0,

@@ -1,0 +1,130 @@
+//! The model's own run: what the plant would do under the commands alone, and how far that is right.
+
+use super::hypothesis::Sensors;
+use super::linear::{dot, sparse_dot};
+use super::model::ModeModel;
+use crate::kernel::bounded;
+use crate::parameters::Hypotheses as Settings;
+use alloc::vec;
+use alloc::vec::Vec;
+use serde::{Deserialize, Serialize};
+
+/// Samples over which the error of the run is estimated.
+const MEMORY: f64 = 300.0;
+/// Least and largest variance of that error, relative to what the model's error allows.
+const SHARE: [f64; 2] = [0.02, 1.0];
+/// The state at the start may be off by so many of its standard deviations.
+const START: f64 = 3.0;
+
+/// The model's own run.
+#[derive(Debug, PartialEq, Serialize, Deserialize)]
+pub(super) struct OwnRun {
+    /// State (n).
+    pub x: Vec<f64>,
+    /// Outputs (p).
+    pub y: Vec<f64>,
+    /// Their variance that the model's error allows (p).
+    bound: Vec<f64>,
+    /// Variance of a reading around them (p).
+    spread: Vec<f64>,
+    /// Running mean of the squared error of each output (p).
+    error: Vec<f64>,
+    /// Running mean of what the model's error allows, as a variance (p).
+    allowed: Vec<f64>,
+}
+
+crate::state!(OwnRun {
+    parts: [x, y, bound, spread, error, allowed],
+    constants: [],
+    counters: []
+});
+
+impl OwnRun {
+    /// At rest at the operating point.
+    pub fn new(model: &ModeModel, settings: &Settings) -> Self {
+        let error = settings.model_error * settings.model_error;
+        let allowed: Vec<f64> = model.bias.iter().map(|square| error * square).collect();
+        Self {
+            x: model.x0.clone(),
+            y: vec![0.0; model.bias.len()],
+            bound: vec![0.0; model.bias.len()],
+            spread: vec![0.0; model.bias.len()],
+            error: allowed.clone(),
+            allowed,
+        }
+    }
+
+    /// Outputs of the sample, with the disturbance as `z` (N) knows it, and how far readings with this
+    /// `noise` (p) may be from them.
+    pub fn read(&mut self, model: &ModeModel, settings: &Settings, z: &[f64], noise: &[f64]) {
+        for (q, noise) in noise.iter().enumerate().take(self.y.len()) {
+            self.y[q] = model.output(q, &self.x, z);
+            self.bound[q] = self.allowed(model, settings, q, q);
+            self.spread[q] = noise * noise + self.share(q) * self.bound[q];
+        }
+    }
+
+    /// One sample on under the input `u` (m), with the disturbance as `z` (N) knows it. `next` holds n.
+    pub fn advance(&mut self, m: usize, model: &ModeModel, z: &[f64], u: &[f64], next: &mut [f64]) {
+        for (i, next) in next.iter_mut().enumerate() {
+            let [own, waves, _] = model.motion.parts(i);
+            let mut sum = model.state_offset[i] + sparse_dot(own, &self.x) + sparse_dot(waves, z);
+            sum += dot(&model.b[i * m..(i + 1) * m], u);
+            *next = bounded(sum);
+        }
+        self.x.copy_from_slice(next);
+    }
+
+    /// Sensors that a hypothesis with these `outputs` (p) moves away from the run, by more than the root of
+    /// `limit` deviations.
+    pub fn displaced(&self, outputs: &[f64], limit: f64) -> Sensors {
+        let own = self.y.iter().zip(&self.spread);
+        let mut set = 0;
+        for (q, (output, (alone, spread))) in outputs.iter().zip(own).enumerate().take(64) {
+            let off = output - alone;
+            set |= Sensors::from(off * off > limit * spread) << q;
+        }
+        set
+    }
+
+    /// Variance of state `k` that the model's error allows.
+    pub fn variance(&self, model: &ModeModel, settings: &Settings, k: usize) -> f64 {
+        let off = settings.model_error * (self.x[k] - model.x0[k]);
+        let start = START * settings.start[k];
+        off * off + start * start
+    }
+
+    /// Covariance of the outputs `q` and `j`, by what the error has been so far.
+    pub fn covariance(&self, model: &ModeModel, settings: &Settings, q: usize, j: usize) -> f64 {
+        libm::sqrt(self.share(q) * self.share(j)) * self.allowed(model, settings, q, j)
+    }
+
+    /// Learns the error, given the `outputs` (p) that the leading hypothesis expects.
+    pub fn learn(&mut self, outputs: &[f64]) {
+        for (q, output) in outputs.iter().enumerate() {
+            let off = output - self.y[q];
+            self.error[q] += (bounded(off * off) - self.error[q]) / MEMORY;
+            self.allowed[q] += (bounded(self.bound[q]) - self.allowed[q]) / MEMORY;
+        }
+    }
+
+    fn allowed(&self, model: &ModeModel, settings: &Settings, q: usize, j: usize) -> f64 {
+        let n = self.x.len();
+        let row = |q: usize| &model.c[q * n..(q + 1) * n];
+        let pairs = row(q).iter().zip(row(j)).enumerate();
+        pairs
+            .map(|(k, (a, b))| a * b * self.variance(model, settings, k))
+            .sum()
+    }
+
+    /// Variance of output `q` relative to what the model's error allows.
+    fn share(&self, q: usize) -> f64 {
+        let [least, most] = SHARE;
+        let share = self.error[q] / self.allowed[q].max(f64::MIN_POSITIVE);
+        if share.is_finite() {
+            share.clamp(least, most)
+        } else {
+            most
+        }
+    }
+}
