@@ -17,6 +17,7 @@ pub(crate) struct Sizes {
     pub states: usize,
     pub inputs: usize,
     pub outputs: usize,
+    pub disturbances: usize,
     pub modes: usize,
 }
 
@@ -106,6 +107,7 @@ fn modes(parameters: &ControllerParameters) -> Result<Sizes, ControllerError> {
         });
     };
     let (n, m, p) = (first.a.nrows(), first.b.ncols(), first.c.nrows());
+    let s = first.e.ncols();
     range(
         n > 0 && m > 0 && p > 0,
         "modes[0]",
@@ -116,6 +118,8 @@ fn modes(parameters: &ControllerParameters) -> Result<Sizes, ControllerError> {
         shape(field("a"), &mode.a, (n, n))?;
         shape(field("b"), &mode.b, (n, m))?;
         shape(field("c"), &mode.c, (p, n))?;
+        shape(field("e"), &mode.e, (n, s))?;
+        shape(field("f"), &mode.f, (p, s))?;
         vector(&field("x0"), &mode.x0, n)?;
         vector(&field("u0"), &mode.u0, m)?;
         vector(&field("y0"), &mode.y0, p)?;
@@ -124,6 +128,7 @@ fn modes(parameters: &ControllerParameters) -> Result<Sizes, ControllerError> {
         states: n,
         inputs: m,
         outputs: p,
+        disturbances: s,
         modes: parameters.modes.len(),
     })
 }
@@ -296,30 +301,13 @@ const LARGEST_SHARE: f64 = 1e6;
 
 fn hypotheses(settings: &Hypotheses, sizes: Sizes) -> Checked {
     let (n, m, p) = (sizes.states, sizes.inputs, sizes.outputs);
-    length(
-        "estimator.hypotheses.channels",
-        settings.channels.len(),
-        sizes.modes,
-    )?;
-    let s = settings.channels.first().map_or(0, |first| first.e.ncols());
+    let s = sizes.disturbances;
     let waves = (2 * s).saturating_mul(settings.angles.len());
     range(
         waves.saturating_add(2 * n + m + p) <= LARGEST_JOINT_STATE,
         "estimator.hypotheses",
         "must estimate at most 1000 states together: twice the plant's, inputs, outputs and waves",
     )?;
-    for channels in &settings.channels {
-        shape(
-            "estimator.hypotheses.channels.e".into(),
-            &channels.e,
-            (n, s),
-        )?;
-        shape(
-            "estimator.hypotheses.channels.f".into(),
-            &channels.f,
-            (p, s),
-        )?;
-    }
     for (what, values, needed) in [
         ("noise", &settings.noise, p),
         ("fault_size", &settings.fault_size, p),

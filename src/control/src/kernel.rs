@@ -33,9 +33,32 @@ pub fn bounded_change(value: f64, change: f64) -> f64 {
 
 /// `out += matrix * vector`.
 pub fn add_product(out: &mut [f64], matrix: &Matrix, vector: &[f64]) {
-    for (column, &factor) in matrix.columns().zip(vector) {
-        add_scaled(out, factor, column);
+    let rows = matrix.nrows();
+    match rows {
+        1 if out.len() >= rows => add_few::<1>(out, matrix, vector),
+        2 if out.len() >= rows => add_few::<2>(out, matrix, vector),
+        3 if out.len() >= rows => add_few::<3>(out, matrix, vector),
+        4 if out.len() >= rows => add_few::<4>(out, matrix, vector),
+        _ => {
+            for (column, &factor) in matrix.columns().zip(vector) {
+                add_scaled(out, factor, column);
+            }
+        }
     }
+}
+
+/// The same for a matrix of few rows: the sums stay in registers.
+fn add_few<const ROWS: usize>(out: &mut [f64], matrix: &Matrix, vector: &[f64]) {
+    let Some(out) = out.first_chunk_mut::<ROWS>() else {
+        return;
+    };
+    let mut sums = *out;
+    for (column, factor) in matrix.as_slice().as_chunks::<ROWS>().0.iter().zip(vector) {
+        for (sum, value) in sums.iter_mut().zip(column) {
+            *sum += factor * value;
+        }
+    }
+    *out = sums;
 }
 
 /// `out = start + matrix * vector`.
@@ -82,18 +105,31 @@ pub fn dot(left: &[f64], right: &[f64]) -> f64 {
     left.iter().zip(right).map(|(l, r)| l * r).sum()
 }
 
-/// Inner product in four sums side by side, for long vectors: no addition waits for the one before
-/// it. Its order is fixed too.
-pub fn long_dot(left: &[f64], right: &[f64]) -> f64 {
-    let (left, left_rest) = left.as_chunks::<4>();
-    let (right, right_rest) = right.as_chunks::<4>();
-    let mut sums = [0.0; 4];
-    for (l, r) in left.iter().zip(right) {
-        for (sum, (l, r)) in sums.iter_mut().zip(l.iter().zip(r)) {
+/// Inner products of four vectors with another one, each in four sums side by side, for long vectors: no
+/// addition waits for the one before it. Their order is fixed too. All have `right`'s length, a multiple
+/// of four.
+pub fn four_dots(left: [&[f64]; 4], right: &[f64]) -> [f64; 4] {
+    let [a, b, c, d] = left.map(|vector| vector.as_chunks::<4>().0);
+    let mut sums = [[0.0; 4]; 4];
+    let add = |sum: &mut [f64; 4], l: &[f64; 4], r: &[f64; 4]| {
+        for (sum, (l, r)) in sum.iter_mut().zip(l.iter().zip(r)) {
             *sum += l * r;
         }
+    };
+    let left = a.iter().zip(b).zip(c.iter().zip(d));
+    for (((a, b), (c, d)), right) in left.zip(right.as_chunks::<4>().0) {
+        add(&mut sums[0], a, right);
+        add(&mut sums[1], b, right);
+        add(&mut sums[2], c, right);
+        add(&mut sums[3], d, right);
     }
-    (sums[0] + sums[2]) + (sums[1] + sums[3]) + dot(left_rest, right_rest)
+    totals(&sums)
+}
+
+/// Apart, so that the sums before it are not interleaved for its sake.
+#[inline(never)]
+fn totals(sums: &[[f64; 4]; 4]) -> [f64; 4] {
+    sums.map(|[a, b, c, d]| (a + c) + (b + d))
 }
 
 #[cfg(test)]
@@ -122,10 +158,28 @@ mod tests {
         }
 
         #[test]
-        fn a_long_product_is_a_product(pairs in prop::collection::vec((-10.0..10.0f64, -10.0..10.0f64), 0..40)) {
-            let (left, right): (Vec<f64>, Vec<f64>) = pairs.into_iter().unzip();
-            let (long, plain) = (long_dot(&left, &right), dot(&left, &right));
-            prop_assert!((long - plain).abs() <= 1e-11);
+        fn four_products_are_products(groups in 0usize..9, seed in prop::collection::vec(-10.0..10.0f64, 11)) {
+            let vector = |k: usize| (0..4 * groups).map(|at| seed[(3 * at + k) % 11]).collect::<Vec<f64>>();
+            let (left, right) = ([0, 1, 2, 3].map(vector), vector(4));
+            let four = four_dots(left.each_ref().map(Vec::as_slice), &right);
+            for (one, left) in four.into_iter().zip(&left) {
+                prop_assert!((one - dot(left, &right)).abs() <= 1e-11);
+            }
+        }
+
+        /// Few rows are added up in registers, to the same bits.
+        #[test]
+        fn few_rows_are_added_up_as_many_are(
+            rows in 0usize..7, room in 0usize..3, entries in prop::collection::vec(-10.0..10.0f64, 42), x in prop::collection::vec(-10.0..10.0f64, 6),
+        ) {
+            let matrix = Matrix::from_fn(rows, 6, |r, c| entries[6 * r + c]);
+            let mut out = vec![0.5; rows + room];
+            let mut wanted = out.clone();
+            add_product(&mut out, &matrix, &x);
+            for (column, factor) in matrix.columns().zip(x) {
+                add_scaled(&mut wanted, factor, column);
+            }
+            prop_assert_eq!(out, wanted);
         }
 
         #[test]

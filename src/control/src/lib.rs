@@ -20,7 +20,8 @@
 //! };
 //! let controller = Controller::new(ControllerParameters {
 //!     sample_time: 1.0,
-//!     modes: vec![ModeModel { a: one(0.9), b: one(1.0), c: one(1.0), x0: vec![0.0], u0: vec![0.0], y0: vec![0.0] }],
+//!     modes: vec![ModeModel { a: one(0.9), b: one(1.0), c: one(1.0), e: Matrix::zeros(1, 0), f: Matrix::zeros(1, 0),
+//!         x0: vec![0.0], u0: vec![0.0], y0: vec![0.0] }],
 //!     feedback: StateFeedback {
 //!         tracked: vec![0], latency: 0, resonators: vec![], transfer: None, modes: vec![gains],
 //!     },

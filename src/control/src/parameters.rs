@@ -25,7 +25,7 @@ pub struct ControllerParameters {
 }
 
 /// One mode of the plant, linear about its operating point:
-/// `x(k+1) = x0 + A (x - x0) + B (u - u0)`, `y = y0 + C (x - x0)`.
+/// `x(k+1) = x0 + A (x - x0) + B (u - u0) + E w`, `y = y0 + C (x - x0) + F w`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct ModeModel {
     /// State matrix `A` (n x n).
@@ -34,6 +34,10 @@ pub struct ModeModel {
     pub b: Matrix,
     /// Output matrix `C` (p x n).
     pub c: Matrix,
+    /// How the disturbance enters the state: `E` (n x s).
+    pub e: Matrix,
+    /// How the disturbance enters the outputs: `F` (p x s).
+    pub f: Matrix,
     /// State `x0` of the operating point (n).
     pub x0: Vec<f64>,
     /// Input `u0` of the operating point (m).
@@ -217,20 +221,9 @@ pub enum Ambiguous {
     TrustModel,
 }
 
-/// How the periodic disturbance enters in one mode.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Channels {
-    /// Into the state: `E` (n x s).
-    pub e: Matrix,
-    /// Into the outputs: `F` (p x s).
-    pub f: Matrix,
-}
-
 /// Sizes and rates of what may happen to sensors and plant, for [`EstimatorMethod::Observer`].
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Hypotheses {
-    /// How the disturbance enters, per mode.
-    pub channels: Vec<Channels>,
     /// Standard deviation of the noise of each sensor (p), output units.
     pub noise: Vec<f64>,
     /// Faults per sample and sensor.

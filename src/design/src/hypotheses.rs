@@ -1,9 +1,8 @@
 //! Sizes and rates for the state-based estimator, from the plant and its signals.
 
 use crate::harmonics::KnownDisturbance;
-use crate::matrices::plain;
 use crate::{Signal, Signals};
-use ftc_control::parameters::{Ambiguous, Channels, Hypotheses};
+use ftc_control::parameters::{Ambiguous, Hypotheses};
 use ftc_plant::{Mode, Scenario, SwitchedPlant};
 
 /// What may be asked of the state-based estimator; the rest follows from the design.
@@ -106,12 +105,7 @@ impl HypothesesSpec {
         let waves = disturbance
             .iter()
             .flat_map(|&size| vec![size; 2 * angles.len()]);
-        let channels = plant.modes.iter().map(|mode| Channels {
-            e: plain(&mode.e),
-            f: plain(&mode.f),
-        });
         Hypotheses {
-            channels: channels.collect(),
             noise,
             fault_rate: self.fault_rate,
             stuck_rate: STUCK_RATE,

@@ -24,6 +24,8 @@ pub fn mode_models(plant: &SwitchedPlant) -> Vec<ModeModel> {
         a: plain(&mode.a),
         b: plain(&mode.b),
         c: plain(&mode.c),
+        e: plain(&mode.e),
+        f: plain(&mode.f),
         x0: mode.operating_point.x.clone(),
         u0: mode.operating_point.u.clone(),
         y0: mode.operating_point.y.clone(),

@@ -131,7 +131,10 @@ pub enum FaultKind {
 
 /// The first tick at or after `time` seconds; a time that is a whole number of samples but for rounding counts as one.
 pub fn first_tick(time: f64, sample_time: f64) -> u64 {
-    libm::ceil(time / sample_time - 1e-9).max(0.0) as u64
+    let ticks = time / sample_time - 1e-9;
+    // A conversion rounds towards zero, and what is no number becomes zero.
+    let below = ticks as u64;
+    below.saturating_add(u64::from((below as f64) < ticks))
 }
 
 impl Waveform {
@@ -223,6 +226,24 @@ impl FaultEvent {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// The conversion in [`first_tick`] is a ceiling, for whatever time a file may hold.
+    #[test]
+    fn the_first_tick_is_the_ceiling() {
+        let near = (-40..400).map(|k| f64::from(k) * 0.05);
+        let far = [1e15, 1.8e19, 1e20, 1e300, -1e300, 0.0, -0.0];
+        let none = [f64::NAN, f64::INFINITY, f64::NEG_INFINITY];
+        for time in near.chain(far).chain(none) {
+            for sample_time in [0.1, 1.0, 1.0 / 60.0] {
+                let wanted = libm::ceil(time / sample_time - 1e-9).max(0.0) as u64;
+                assert_eq!(
+                    first_tick(time, sample_time),
+                    wanted,
+                    "{time} {sample_time}"
+                );
+            }
+        }
+    }
 
     #[test]
     fn steps_hold_from_their_time_on() {

@@ -12,32 +12,34 @@ pub struct Tolerance {
     pub absolute: f64,
 }
 
-/// Stage times of the Dormand-Prince tableau are not needed: the systems here do not depend on time explicitly.
-const STAGES: [&[f64]; 6] = [
-    &[1.0 / 5.0],
-    &[3.0 / 40.0, 9.0 / 40.0],
-    &[44.0 / 45.0, -56.0 / 15.0, 32.0 / 9.0],
-    &[
-        19372.0 / 6561.0,
-        -25360.0 / 2187.0,
-        64448.0 / 6561.0,
-        -212.0 / 729.0,
-    ],
-    &[
-        9017.0 / 3168.0,
-        -355.0 / 33.0,
-        46732.0 / 5247.0,
-        49.0 / 176.0,
-        -5103.0 / 18656.0,
-    ],
-    &[
-        35.0 / 384.0,
-        0.0,
-        500.0 / 1113.0,
-        125.0 / 192.0,
-        -2187.0 / 6784.0,
-        11.0 / 84.0,
-    ],
+/// A stage: weights of the slopes before it. Stage times of the Dormand-Prince tableau are not needed: the
+/// systems here do not depend on time explicitly.
+type Stage<const K: usize> = [f64; K];
+
+const SECOND: Stage<1> = [1.0 / 5.0];
+const THIRD: Stage<2> = [3.0 / 40.0, 9.0 / 40.0];
+const FOURTH: Stage<3> = [44.0 / 45.0, -56.0 / 15.0, 32.0 / 9.0];
+const FIFTH: Stage<4> = [
+    19372.0 / 6561.0,
+    -25360.0 / 2187.0,
+    64448.0 / 6561.0,
+    -212.0 / 729.0,
+];
+const SIXTH: Stage<5> = [
+    9017.0 / 3168.0,
+    -355.0 / 33.0,
+    46732.0 / 5247.0,
+    49.0 / 176.0,
+    -5103.0 / 18656.0,
+];
+/// The last stage is the result.
+const RESULT: Stage<6> = [
+    35.0 / 384.0,
+    0.0,
+    500.0 / 1113.0,
+    125.0 / 192.0,
+    -2187.0 / 6784.0,
+    11.0 / 84.0,
 ];
 
 /// Difference between the fifth- and the fourth-order weights.
@@ -71,59 +73,98 @@ pub fn advance<const N: usize>(
 ) -> Result<(), Stalled> {
     let mut left = duration;
     let mut step = duration / 8.0;
+    let mut slope = derivative(state);
     for _ in 0..MOST_STEPS {
         step = step.min(left);
-        let (next, error) = attempt(state, step, tolerance, &derivative);
-        if error <= 1.0 {
-            *state = next;
+        let tried = attempt(state, slope, step, tolerance, &derivative);
+        if tried.error <= 1.0 {
+            *state = tried.state;
+            slope = tried.slope;
             left -= step;
             if left <= 1e-12 * duration {
                 return Ok(());
             }
         }
-        let factor = if error > 0.0 {
-            0.9 * libm::pow(error, -0.2)
-        } else {
-            5.0
-        };
-        step *= factor.clamp(0.2, 5.0);
+        step *= factor(tried.error);
     }
     Err(Stalled)
 }
 
-/// One step: the fifth-order result and the error in units of the tolerance, infinite where the
-/// result is no number.
+/// By what the next step is longer, after one with this error in units of the tolerance.
+fn factor(error: f64) -> f64 {
+    // `0.9 error^-0.2` is well beyond the limit of 5 here.
+    const TINY: f64 = 1e-4;
+    if error > TINY {
+        (0.9 * libm::pow(error, -0.2)).clamp(0.2, 5.0)
+    } else {
+        5.0
+    }
+}
+
+/// What a step leads to.
+struct Tried<const N: usize> {
+    /// The fifth-order result.
+    state: [f64; N],
+    /// The derivative there.
+    slope: [f64; N],
+    /// The error in units of the tolerance, infinite where the result is no number.
+    error: f64,
+}
+
+/// One step from `state`, where the derivative is `slope`.
 fn attempt<const N: usize>(
     state: &[f64; N],
+    slope: [f64; N],
     step: f64,
     tolerance: Tolerance,
     derivative: &impl Fn(&[f64; N]) -> [f64; N],
-) -> ([f64; N], f64) {
-    let mut slopes = [[0.0; N]; STAGES.len() + 1];
-    slopes[0] = derivative(state);
-    let mut point = *state;
-    for (stage, weights) in STAGES.iter().enumerate() {
-        point = *state;
-        for (slope, weight) in slopes.iter().zip(*weights) {
-            for (value, rate) in point.iter_mut().zip(slope) {
-                *value += step * weight * rate;
-            }
-        }
-        slopes[stage + 1] = derivative(&point);
-    }
+) -> Tried<N> {
+    let first = slope;
+    let second = derivative(&moved(state, step, &SECOND, [&first]));
+    let third = derivative(&moved(state, step, &THIRD, [&first, &second]));
+    let fourth = derivative(&moved(state, step, &FOURTH, [&first, &second, &third]));
+    let slopes = [&first, &second, &third, &fourth];
+    let fifth = derivative(&moved(state, step, &FIFTH, slopes));
+    let slopes = [&first, &second, &third, &fourth, &fifth];
+    let sixth = derivative(&moved(state, step, &SIXTH, slopes));
+    let slopes = [&first, &second, &third, &fourth, &fifth, &sixth];
+    let result = moved(state, step, &RESULT, slopes);
+    let last = derivative(&result);
     let mut estimates = [0.0; N];
-    for (slope, weight) in slopes.iter().zip(&ERROR) {
+    let slopes = [&first, &second, &third, &fourth, &fifth, &sixth, &last];
+    for (slope, weight) in slopes.into_iter().zip(&ERROR) {
         for (estimate, rate) in estimates.iter_mut().zip(slope) {
             *estimate += weight * rate;
         }
     }
     let mut worst: f64 = 0.0;
-    for ((&old, &new), estimate) in state.iter().zip(&point).zip(estimates) {
+    for ((&old, &new), estimate) in state.iter().zip(&result).zip(estimates) {
         let allowed = tolerance.absolute + tolerance.relative * old.abs().max(new.abs());
         let error = (step * estimate).abs() / allowed;
         worst = worst.max(if error.is_nan() { f64::INFINITY } else { error });
     }
-    (point, worst)
+    Tried {
+        state: result,
+        slope: last,
+        error: worst,
+    }
+}
+
+/// `state + step * sum of weight * slope`.
+#[inline(always)]
+fn moved<const N: usize, const K: usize>(
+    state: &[f64; N],
+    step: f64,
+    weights: &Stage<K>,
+    slopes: [&[f64; N]; K],
+) -> [f64; N] {
+    let mut point = *state;
+    for (slope, weight) in slopes.into_iter().zip(weights) {
+        for (value, rate) in point.iter_mut().zip(slope) {
+            *value += step * weight * rate;
+        }
+    }
+    point
 }
 
 #[cfg(test)]
@@ -173,6 +214,17 @@ mod tests {
         };
         assert!(error(1e-6) < 1e-4);
         assert!(error(1e-9) < 1e-7);
+    }
+
+    #[test]
+    fn a_step_grows_as_its_error_allows() {
+        for error in [1e-3, 0.1, 1.0, 1.9, 1e3, 1e9, f64::INFINITY] {
+            let wanted = (0.9 * libm::pow(error, -0.2)).clamp(0.2, 5.0);
+            assert_eq!(factor(error), wanted);
+        }
+        // Where nothing is computed the limit is reached, whatever the rounding.
+        assert!(0.9 * libm::pow(1e-4, -0.2) > 5.5);
+        assert_eq!([factor(0.0), factor(1e-300), factor(1e-4)], [5.0; 3]);
     }
 
     /// `x' = x^2` from 1 is `1 / (1 - t)`: there is nothing after t = 1.

@@ -98,6 +98,8 @@ pub struct PlantState {
     pub reference: Vec<f64>,
     /// Measurement noise (p).
     pub noise: Vec<f64>,
+    /// The tick that the noise was drawn for, if any was.
+    drawn: Option<u64>,
     /// Last reading outside any event (p), for sensors that get stuck.
     last: Vec<f64>,
     /// Scratch (n).
@@ -120,7 +122,7 @@ ftc_control::state!(PlantState {
         departed
     ],
     constants: [],
-    counters: [tick, mode, told]
+    counters: [tick, mode, told, drawn]
 });
 
 impl PlantSimulator {
@@ -184,6 +186,7 @@ impl PlantSimulator {
             disturbance: vec![0.0; dims.disturbances],
             reference: vec![0.0; self.scenario.reference.len()],
             noise: vec![0.0; dims.outputs],
+            drawn: None,
             last: point.y.clone(),
             next: vec![0.0; dims.states],
             departed: Departed::new(point, &self.deviation),
@@ -290,6 +293,11 @@ impl PlantSimulator {
         let deviation = &self.scenario.noise;
         if !on || deviation.iter().all(|&d| d == 0.0) {
             state.noise.fill(0.0);
+            state.drawn = None;
+            return;
+        }
+        // A tick is observed twice: when the one before it ends, and when it begins.
+        if state.drawn.replace(state.tick) == Some(state.tick) {
             return;
         }
         noise::standard_normal(self.scenario.seed, state.tick, &mut state.noise);
@@ -392,7 +400,7 @@ mod tests {
         ) {
             let simulator = simulator();
             let [x, y, y_true, fault, disturbance, reference, noise, last, next] = sizes.map(|size| vec![1.0; size]);
-            let mut state = PlantState { tick: 3, mode, x, y, y_true, fault, disturbance, reference, noise, last, next, told: mode, departed: Departed::default() };
+            let mut state = PlantState { tick: 3, mode, x, y, y_true, fault, disturbance, reference, noise, last, next, told: mode, drawn: None, departed: Departed::default() };
             let (u, f, w) = (vec![1.0; m], vec![1.0; p], vec![1.0; s]);
             let external = External { fault: &f, disturbance: &w, mode: given, noise: true };
             simulator.advance(&mut state, &u).unwrap();

@@ -7,6 +7,7 @@ use campaign::{Options, Partial, Watch};
 use clap::Args;
 use ftc_design::Design;
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
+use package::Replacement;
 use package::output::Staging;
 use std::fmt::Write as _;
 use std::io::IsTerminal;
@@ -224,40 +225,37 @@ fn listen(watch: &Arc<Watch>) {
 /// The Parquet file, under another name until it is complete.
 struct Rows {
     writer: RowWriter<std::fs::File>,
-    temporary: tempfile::TempPath,
-    target: PathBuf,
+    replacement: Replacement,
 }
 
 impl Rows {
     fn new(out: &Path) -> Result<Self, Failure> {
-        let target = out.join(ROWS);
+        let target = &out.join(ROWS);
         let made = std::fs::create_dir_all(out).and_then(|()| {
-            tempfile::Builder::new()
-                .prefix(".ftc-fmu-")
-                .tempfile_in(out)
+            let replacement = Replacement::of(target)?;
+            Ok((replacement.file()?, replacement))
         });
-        let (file, temporary) = made.map_err(|error| blame(&target, error))?.into_parts();
-        let writer = RowWriter::new(file).map_err(|error| blame(&target, error))?;
+        let (file, replacement) = made.map_err(|error| blame(target, error))?;
+        let writer = RowWriter::new(file).map_err(|error| blame(target, error))?;
         Ok(Self {
             writer,
-            temporary,
-            target,
+            replacement,
         })
     }
 
     fn write(&mut self, outcomes: &[campaign::Outcome]) -> Result<(), Failure> {
         self.writer
             .write(outcomes)
-            .map_err(|error| blame(&self.target, error))
+            .map_err(|error| blame(self.replacement.target(), error))
     }
 
     fn keep(self) -> Result<(), Failure> {
-        let target = self.target;
+        let target = self.replacement.target().to_path_buf();
         self.writer
             .finish()
             .map_err(|error| blame(&target, error))?;
-        self.temporary
-            .persist(&target)
+        self.replacement
+            .keep()
             .map_err(|error| blame(&target, error))
     }
 }

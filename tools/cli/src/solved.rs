@@ -8,8 +8,10 @@ use crate::failure::Failure;
 use ftc_design::assembly::Request;
 use ftc_design::coverage::CoverageError;
 use ftc_design::{Design, FORMAT, Solver};
+use package::Replacement;
 use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
+use std::io::Write;
 use std::path::Path;
 
 /// What stands in the file.
@@ -46,14 +48,9 @@ pub fn save(path: &Path, key: String, design: &Design) -> Result<(), Failure> {
         design: text,
     };
     let bytes = serde_json::to_vec(&solved).map_err(|error| failed(error.to_string()))?;
-    let folder = match path.parent() {
-        Some(folder) if !folder.as_os_str().is_empty() => folder,
-        _ => Path::new("."),
-    };
-    let written = tempfile::NamedTempFile::new_in(folder).and_then(|mut file| {
-        std::io::Write::write_all(&mut file, &bytes)?;
-        file.as_file().sync_all()?;
-        file.persist(path).map(drop).map_err(|error| error.error)
+    let written = Replacement::of(path).and_then(|replacement| {
+        replacement.file()?.write_all(&bytes)?;
+        replacement.keep()
     });
     written.map_err(|error| failed(format!("cannot be written ({error}): choose another file")))
 }

@@ -2,7 +2,8 @@
 //!
 //! [`export`] writes the controller FMU, the plant FMU and on request an SSP package that connects
 //! them; nothing is compiled and the same design gives the same bytes. [`verify`] proves the
-//! certificate of a written FMU again. [`output`] writes a set of files completely or not at all.
+//! certificate of a written FMU again. [`output`] writes a set of files completely or not at all,
+//! [`Replacement`] a single one.
 //!
 //! ```no_run
 //! # fn main() -> Result<(), Box<dyn std::error::Error>> {
@@ -31,10 +32,12 @@ mod export;
 pub mod output;
 pub mod platform;
 mod reading;
+mod replacement;
 pub mod signature;
 mod ssp;
 mod verify;
 
 pub use error::Error;
 pub use export::{Exported, Options, Packed, export};
+pub use replacement::Replacement;
 pub use verify::{Checks, Verification, verify, verify_with};

@@ -71,17 +71,39 @@ impl InputHistory {
 /// `|R^-T phi|^2`: the variance of the prediction in units of the noise variance.
 ///
 /// `factor` is `R` (q x q, upper triangular), `whitened` scratch (q). Forward substitution reads
-/// the columns of `R`, which lie contiguous.
+/// the columns of `R`, which lie contiguous, four of them at a time.
 pub fn leverage(factor: &Matrix, regressor: &[f64], whitened: &mut [f64]) -> f64 {
     let mut sum = 0.0;
-    for (index, (column, &entry)) in factor.columns().zip(regressor).enumerate() {
-        let (solved, rest) = whitened.split_at_mut(index.min(whitened.len()));
-        let (above, diagonal) = column.split_at(index.min(column.len()));
-        let (Some(value), Some(&pivot)) = (rest.first_mut(), diagonal.first()) else {
+    let mut columns = factor.columns();
+    let mut solved_count = 0;
+    while let Some(first) = columns.next() {
+        let mut next = || columns.next().unwrap_or(first);
+        let four = [first, next(), next(), next()];
+        let above = four.map(|column| column.get(..solved_count).unwrap_or_default());
+        let (solved, rest) = whitened.split_at_mut(solved_count.min(whitened.len()));
+        let products = kernel::four_dots(above, solved);
+        let below = four.map(|column| column.get(solved_count..).unwrap_or_default());
+        let entries = regressor.get(solved_count..).unwrap_or_default();
+        let new = rest.len().min(entries.len()).min(4);
+        for (index, ((column, &entry), product)) in
+            below.iter().zip(entries).zip(products).enumerate()
+        {
+            if index >= new {
+                break;
+            }
+            let (known, unknown) = rest.split_at_mut(index);
+            let (left, diagonal) = column.split_at(index.min(column.len()));
+            let (Some(value), Some(&pivot)) = (unknown.first_mut(), diagonal.first()) else {
+                return kernel::bounded(sum);
+            };
+            let product = product + kernel::dot(left, known);
+            *value = kernel::bounded((entry - product) / pivot);
+            sum += *value * *value;
+        }
+        solved_count += new;
+        if new < 4 {
             break;
-        };
-        *value = kernel::bounded((entry - kernel::long_dot(above, solved)) / pivot);
-        sum += *value * *value;
+        }
     }
     kernel::bounded(sum)
 }

@@ -7,7 +7,7 @@ use super::model::{Layout, ModeModel};
 use super::own_run::OwnRun;
 use super::{Bank, BankState, Live, NOISE_AT_START, NOISE_PRIOR, Prices, SLOTS};
 use crate::matrix::Matrix;
-use crate::parameters::{Channels, Hypotheses, ModeModel as Described};
+use crate::parameters::{Hypotheses, ModeModel as Described};
 use alloc::vec;
 use alloc::vec::Vec;
 
@@ -78,13 +78,12 @@ fn left_inverse(b: &[f64], n: usize, m: usize) -> Vec<f64> {
 fn loads(
     layout: Layout,
     mode: &Described,
-    channels: &Channels,
     settings: &Hypotheses,
 ) -> (Vec<f64>, Vec<f64>, Vec<f64>) {
     let Layout { n, m, s, .. } = layout;
     let effect = Matrix::from_fn(n, layout.loads(), |i, k| match k {
         k if k < m => mode.b.get(i, k).unwrap_or(0.0),
-        k if k < m + s => channels.e.get(i, k - m).unwrap_or(0.0),
+        k if k < m + s => mode.e.get(i, k - m).unwrap_or(0.0),
         k => f64::from(k - m - s == i),
     });
     let mut sizes = settings.input_load.clone();
@@ -104,12 +103,7 @@ fn loads(
     (rows(&effect), sizes, growth)
 }
 
-fn model(
-    layout: Layout,
-    mode: &Described,
-    channels: &Channels,
-    settings: &Hypotheses,
-) -> ModeModel {
+fn model(layout: Layout, mode: &Described, settings: &Hypotheses) -> ModeModel {
     let Layout { n, m, .. } = layout;
     let (b, c) = (rows(&mode.b), rows(&mode.c));
     let spread = |row: &[f64]| {
@@ -118,7 +112,7 @@ fn model(
     };
     let bias: Vec<f64> = c.chunks_exact(n).map(spread).collect();
     let inverse = left_inverse(&b, n, m);
-    let loads = loads(layout, mode, channels, settings);
+    let loads = loads(layout, mode, settings);
     let error = settings.model_error;
     let starts = settings.start_elsewhere.iter();
     let most = starts
@@ -134,8 +128,8 @@ fn model(
         rows(&mode.a),
         b,
         c,
-        waves(&channels.e, harmonics),
-        waves(&channels.f, harmonics),
+        waves(&mode.e, harmonics),
+        waves(&mode.f, harmonics),
         (&mode.x0, &mode.u0, &mode.y0),
         loads,
         (bias, most),
@@ -169,7 +163,7 @@ impl Bank {
             d,
             s: disturbances,
         };
-        let described = modes.iter().zip(&settings.channels);
+        let described = modes.iter();
         let ln = libm::log;
         let turn = |_| {
             settings
@@ -180,7 +174,7 @@ impl Bank {
         Self {
             layout,
             modes: described
-                .map(|(mode, channels)| model(layout, mode, channels, settings))
+                .map(|mode| model(layout, mode, settings))
                 .collect(),
             rotation: (0..disturbances).flat_map(turn).collect(),
             waves: waves_of(settings, d),
