@@ -1,0 +1,56 @@
+//! The resource of the binaries holds the design, all of it but the proof, in little more than its numbers.
+//!
+//! promise: small-resource
+#![allow(missing_docs)]
+
+use ftc_design::Design;
+use model_description::{read_design, write_design};
+use serde_json::Value;
+use std::path::Path;
+
+/// Bytes for names of fields, units and sizes of lists.
+const NAMES: usize = 5000;
+
+/// Bytes of a number in a list; in a matrix it has 8.
+const NUMBER: usize = 9;
+
+fn design(example: &str) -> Design {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR"))
+        .join("../../examples")
+        .join(example);
+    let request = design_file::read(&path).unwrap().request;
+    ftc_design::assembly::assemble(request).unwrap()
+}
+
+/// Numbers in a value; zeros do not count, as those below the diagonal of a predictor are not written.
+fn numbers(value: &Value) -> usize {
+    match value {
+        Value::Number(number) => usize::from(number.as_f64() != Some(0.0)),
+        Value::Array(list) => list.iter().map(numbers).sum(),
+        Value::Object(fields) => fields.values().map(numbers).sum(),
+        _ => 0,
+    }
+}
+
+#[test]
+fn every_example_is_read_back_from_little_more_than_its_numbers() {
+    for example in [
+        "paper.toml",
+        "paper_latency.toml",
+        "paper_internal_model.toml",
+        "paper_output.toml",
+        "tank.toml",
+        "converter.toml",
+    ] {
+        let mut design = design(example);
+        let bytes = write_design(&design).unwrap();
+        design.proof = None;
+        assert_eq!(read_design(&bytes).unwrap(), design, "{example}");
+        let most = NAMES + NUMBER * numbers(&serde_json::to_value(&design).unwrap());
+        assert!(
+            bytes.len() <= most,
+            "{example}: {} bytes, at most {most}",
+            bytes.len()
+        );
+    }
+}
