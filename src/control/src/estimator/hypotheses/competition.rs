@@ -127,6 +127,7 @@ impl Bank {
         let all = if p >= 64 { u64::MAX } else { (1 << p) - 1 };
         let h = &state.slots[slot];
         let (score, accused, loose, convinced) = (h.score, h.accused(), h.loose, h.convinced);
+        let stuck = h.stuck;
         let likelihood = state.seen[slot].likelihood(p);
         let square = state.seen[slot].square;
         let stay = score + likelihood;
@@ -257,7 +258,8 @@ impl Bank {
             }
         }
         for q in 0..p {
-            if has(free, q) && state.evidence[q] > FREEZING && slot == state.live.first() {
+            let freezes = has(all & !stuck & reading.valid, q) && state.evidence[q] > FREEZING;
+            if freezes && slot == state.live.first() {
                 let value = score
                     + self.prices.stuck
                     + state.evidence_before[q]
