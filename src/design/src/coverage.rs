@@ -259,7 +259,7 @@ fn hypotheses_fit(design: &Design) -> bool {
     let known = found.angles.first().map(|&angle| KnownDisturbance {
         period: core::f64::consts::TAU * plant.sample_time / angle,
         harmonics: found.angles.len(),
-        amplitude: hypotheses::amplitude_is_known(found).then(|| found.disturbance_load.clone()),
+        amplitude: Some(found.disturbance_load.clone()),
     });
     let noise = assembly::sensor_noise(&design.scenario.noise, &estimator.thresholds);
     let tracked = &design.controller.feedback.tracked;

@@ -62,8 +62,8 @@ const INPUT_LOAD: f64 = 0.2;
 const STATE_LOAD: f64 = 0.03;
 /// Wander of a load per sample relative to the size of its jumps.
 const LOAD_WALK: f64 = 5e-3;
-/// Wander of a disturbance of known size per sample, relative to that size: what a sine with a period of
-/// ninety samples does at most.
+/// Wander of a disturbance per sample, relative to its size: what a sine with a period of ninety samples does at
+/// most. Less of it and a disturbance whose period is told wrong is taken for a gain of the inputs that it moves.
 const DISTURBANCE_WALK: f64 = 0.07;
 /// Relative error of an input's gain, and its wander per sample.
 const GAIN_ERROR: f64 = 0.3;
@@ -77,8 +77,8 @@ const START: f64 = 3e-3;
 
 impl HypothesesSpec {
     /// The estimator's sizes and rates for `plant` with these signals and this `noise` of the sensors (p), under
-    /// the disturbance that is `known`. An output whose reference leaves the operating point by more than the
-    /// nominal value has a `reach` (p, as [`reach`] finds it) that stands in for it.
+    /// the disturbance that is `known`. Where the references take an output further from
+    /// its operating points than its nominal value, that distance stands in for it: `reach` (p), or empty.
     pub fn settings(
         &self,
         plant: &SwitchedPlant,
@@ -96,10 +96,6 @@ impl HypothesesSpec {
         let amplitude = known
             .and_then(|known| known.amplitude.clone())
             .filter(|sizes| sizes.iter().all(|&size| size > 0.0));
-        let walk = match amplitude {
-            Some(_) => DISTURBANCE_WALK,
-            None => LOAD_WALK,
-        };
         let disturbance = amplitude.unwrap_or_else(|| unknown_disturbance(plant, &scaling.outputs));
         let angles = known.map_or_else(Vec::new, |known| known.angles(plant.sample_time));
         let waves = disturbance
@@ -122,7 +118,7 @@ impl HypothesesSpec {
                 .clone()
                 .unwrap_or_else(|| scaled(&scaling.inputs, INPUT_LOAD)),
             disturbance_size: waves.collect(),
-            disturbance_walk: scaled(&disturbance, walk),
+            disturbance_walk: scaled(&disturbance, DISTURBANCE_WALK),
             disturbance_load: disturbance,
             state_load: scaled(&scaling.states, STATE_LOAD),
             load_walk: LOAD_WALK,
@@ -160,11 +156,6 @@ pub(crate) fn reach(plant: &SwitchedPlant, tracked: &[usize], scenario: &Scenari
         }
     }
     reach
-}
-
-/// Whether these sizes and rates were made for a disturbance of known amplitude.
-pub(crate) fn amplitude_is_known(settings: &Hypotheses) -> bool {
-    settings.disturbance_walk == scaled(&settings.disturbance_load, DISTURBANCE_WALK)
 }
 
 fn scaled(values: &[f64], factor: f64) -> Vec<f64> {

@@ -26,6 +26,8 @@
 //! assert!(control.spectral_radius.iter().all(|&radius| radius < 0.98));
 //! # Ok::<(), ftc_design::DesignError>(())
 //! ```
+// Without the solver, what only a synthesis needs is never called.
+#![cfg_attr(not(feature = "solver"), allow(dead_code))]
 
 #[cfg(feature = "solver")]
 pub mod as_printed;
