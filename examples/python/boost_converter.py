@@ -71,6 +71,8 @@ def design() -> ftc.Design:
         integral_weight=30.0,
         input_weight=5.0,
         disturbance={"period": 0.01, "amplitude": 0.3},
+        # The model is exact here, so what it does not explain is a fault. The default leaves room for a load.
+        estimator={"method": "reference"},
         scenario={
             "steps": 3000,
             "noise": [0.02, 0.03],
