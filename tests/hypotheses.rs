@@ -137,6 +137,19 @@ fn healthy_sensors_are_not_accused() {
     }
 }
 
+/// Three times the noise that the design was told; thirty times is a known limit.
+#[test]
+fn sensors_noisier_than_told_are_not_accused() {
+    for mut design in designs(19, 4) {
+        let parts = design.scenario.noise.iter_mut();
+        parts.for_each(|deviation| *deviation *= 3.0);
+        let truth = design.plant.clone();
+        let run = simulate(&design, &truth, Variant::Ftc);
+        let accused = run.records.iter().filter(|r| r.flagged.contains(&true));
+        assert_eq!(accused.count(), 0);
+    }
+}
+
 fn tick(controller: &Controller, state: &mut ControllerState, k: u64, mode: usize, y: &[f64]) {
     let sample = controller.sample(k, mode, y, &[0.3, -0.2]).unwrap();
     controller.tick(state, &sample);
