@@ -38,7 +38,8 @@ class Run:
 
     Attributes:
         metrics: Per variant `mse` and `vaf`, each `measured` and `true`, one number per tracked output.
-        warnings: What is worth knowing of this run, one sentence each.
+        warnings: What is worth knowing of the design, of this run and of how it fares on plants that are not quite the
+            model, one sentence each.
         variants: Keys of the variants that ran.
     """
 
@@ -46,7 +47,8 @@ class Run:
         """Wraps what was simulated."""
         self._core = core
         self.metrics: dict[str, Any] = json.loads(core.metrics())
-        self.warnings: list[str] = self.metrics.pop("warnings", [])
+        self.metrics.pop("warnings", None)
+        self.warnings: list[str] = core.warnings()
         self.variants: list[str] = core.variants()
 
     @cached_property
@@ -143,7 +145,7 @@ class Run:
         return figure
 
     def __str__(self) -> str:
-        """Returns the table of figures of merit that `ftc-fmu simulate` prints."""
+        """Returns the table of figures of merit and the warnings that `ftc-fmu simulate` prints."""
         return self._core.text()
 
     def _repr_html_(self) -> str:

@@ -135,9 +135,15 @@ impl Run {
         self.file("metrics.json")
     }
 
-    /// The table for a person.
+    /// The table for a person, and what is worth knowing.
     fn text(&self) -> String {
-        self.simulation.summary.clone()
+        let found = &self.simulation;
+        found.summary.clone() + &report::warnings::text(&found.warnings)
+    }
+
+    /// Of the design, of the run, and of the plants that are not quite the model.
+    fn warnings(&self) -> Vec<String> {
+        self.simulation.warnings.clone()
     }
 
     /// The page.

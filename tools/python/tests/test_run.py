@@ -39,8 +39,10 @@ def test_numbers_are_those_of_the_program(run: ftc.Run, tmp_path: Path) -> None:
         values = frame.index if name == "t" else frame[name]
         np.testing.assert_array_equal(values.to_numpy(), np.array(column, dtype=float), err_msg=name)
     metrics = json.loads((tmp_path / "metrics.json").read_text())
-    assert metrics.pop("warnings") == run.warnings
+    tried = json.loads((tmp_path / "robustness.json").read_text())
+    assert metrics.pop("warnings") + tried["warnings"] == run.warnings
     assert metrics == run.metrics
+    assert all(f"warning: {warning}\n" in str(run) for warning in run.warnings)
 
 
 def test_xarray(run: ftc.Run) -> None:
