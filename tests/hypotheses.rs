@@ -126,14 +126,18 @@ fn healthy_sensors_are_believed_when_an_input_loses_gain() {
     assert!(worst <= 2.0 && median(ratios) <= 1.01, "{worst}");
 }
 
+/// Samples of the design's own scenario in which a sensor is accused.
+fn accusations(design: &Design) -> usize {
+    let run = simulate(design, &design.plant, Variant::Ftc);
+    let accused = run.records.iter().filter(|r| r.flagged.contains(&true));
+    accused.count()
+}
+
 #[test]
 fn healthy_sensors_are_not_accused() {
     for mut design in designs(13, 3) {
         design.scenario.steps = 20_000;
-        let truth = design.plant.clone();
-        let run = simulate(&design, &truth, Variant::Ftc);
-        let accused = run.records.iter().filter(|r| r.flagged.contains(&true));
-        assert_eq!(accused.count(), 0);
+        assert_eq!(accusations(&design), 0);
     }
 }
 
@@ -143,10 +147,7 @@ fn sensors_noisier_than_told_are_not_accused() {
     for mut design in designs(19, 4) {
         let parts = design.scenario.noise.iter_mut();
         parts.for_each(|deviation| *deviation *= 3.0);
-        let truth = design.plant.clone();
-        let run = simulate(&design, &truth, Variant::Ftc);
-        let accused = run.records.iter().filter(|r| r.flagged.contains(&true));
-        assert_eq!(accused.count(), 0);
+        assert_eq!(accusations(&design), 0);
     }
 }
 

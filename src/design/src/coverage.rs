@@ -73,7 +73,7 @@ pub fn prove(design: &Design) -> Result<(), CoverageError> {
     design.check()?;
     let synthesis = design.synthesis().ok_or(CoverageError::NoProof)?;
     synthesis.verify(&design.plant)?;
-    check(design)
+    follows(design, &synthesis)
 }
 
 /// Derives again what can be, and checks the rest against its relations. The sizes are those that
@@ -82,7 +82,10 @@ pub fn prove(design: &Design) -> Result<(), CoverageError> {
 /// # Errors
 /// The first part that does not follow.
 pub fn check(design: &Design) -> Result<(), CoverageError> {
-    let synthesis = &design.synthesis().ok_or(CoverageError::NoProof)?;
+    follows(design, &design.synthesis().ok_or(CoverageError::NoProof)?)
+}
+
+fn follows(design: &Design, synthesis: &Synthesis) -> Result<(), CoverageError> {
     check_feedback(design, synthesis)?;
     check_observer(design, synthesis)?;
     check_operating_points(design)?;

@@ -143,10 +143,7 @@ impl HypothesesSpec {
 pub(crate) fn reach(plant: &SwitchedPlant, tracked: &[usize], scenario: &Scenario) -> Vec<f64> {
     let mut reach = vec![0.0; plant.dimensions().outputs];
     for (&output, signal) in tracked.iter().zip(&scenario.reference) {
-        let levels = (0..scenario.steps).map(|tick| signal.at(tick, plant.sample_time));
-        let [low, high] = levels.fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], level| {
-            [level.min(low), level.max(high)]
-        });
+        let [low, high] = signal.range(scenario.steps, plant.sample_time);
         for mode in &plant.modes {
             let point = mode.operating_point.y[output];
             let far = (high - point).max(point - low);

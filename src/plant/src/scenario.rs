@@ -141,6 +141,14 @@ impl Waveform {
     /// Silence.
     pub const ZERO: Self = Self::Constant { value: 0.0 };
 
+    /// Its least and its largest value in the first `steps` ticks; infinite the wrong way round if there are none.
+    pub fn range(&self, steps: u64, sample_time: f64) -> [f64; 2] {
+        let values = (0..steps).map(|tick| self.at(tick, sample_time));
+        values.fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], value| {
+            [low.min(value), high.max(value)]
+        })
+    }
+
     /// The value at tick `tick` of a system sampled every `sample_time` seconds.
     pub fn at(&self, tick: u64, sample_time: f64) -> f64 {
         let time = tick as f64 * sample_time;

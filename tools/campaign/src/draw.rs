@@ -157,10 +157,7 @@ fn schedule(design: &Design, draws: &mut Draws) -> Vec<ModeInterval> {
 fn reference(design: &Design, index: usize, draws: &mut Draws) -> Waveform {
     let te = design.plant.sample_time;
     let signal = &design.scenario.reference[index];
-    let levels = (0..design.scenario.steps).map(|tick| signal.at(tick, te));
-    let [low, high] = levels.fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], value| {
-        [low.min(value), high.max(value)]
-    });
+    let [low, high] = signal.range(design.scenario.steps, te);
     let whole = length(design);
     let count = 1 + draws.below(MOST_LEVELS);
     let points = (0..count)

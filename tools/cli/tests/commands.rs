@@ -48,8 +48,7 @@ fn every_example_is_designed_and_simulated() {
         let bench = Bench::empty();
         let run = bench.run(&["simulate", path.to_str().unwrap(), "--out", "out"]);
         assert_eq!(run.code(), 0, "{}: {}", path.display(), run.stderr());
-        let metrics: Value =
-            serde_json::from_slice(&fs::read(bench.path("out/metrics.json")).unwrap()).unwrap();
+        let metrics = bench.metrics();
         let mse = |variant: &str| numbers(&metrics[variant]["mse"]["true"]);
         // On a nonlinear plant an estimate carries what the linearisation misses, for which the
         // example's thresholds of 7 V and 0.6 A leave room; its faults last half of the time.
@@ -592,8 +591,7 @@ fn baselines_are_written_beside_the_variants() {
         for name in ["additive.y_true[1]", "mpc.u[2]", "ftc.y[1]"] {
             assert!(header.split(',').any(|column| column == name), "{name}");
         }
-        let metrics: Value =
-            serde_json::from_slice(&fs::read(bench.path("out/metrics.json")).unwrap()).unwrap();
+        let metrics = bench.metrics();
         let mse = |key: &str| numbers(&metrics[key]["mse"]["true"]);
         let bound = mse("deadbeat_bound");
         assert_eq!(bound.len(), 2);

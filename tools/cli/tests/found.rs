@@ -6,7 +6,6 @@
 mod common;
 
 use common::{Bench, FILE};
-use serde_json::Value;
 use std::fs;
 
 /// The paper's example without its own faults, under one event.
@@ -23,8 +22,7 @@ fn run(design: &str) -> (f64, f64, Vec<bool>) {
     let bench = Bench::new(design);
     let run = bench.run(&["simulate", FILE, "--out", "out"]);
     assert_eq!(run.code(), 0, "{}", run.stderr());
-    let metrics: Value =
-        serde_json::from_slice(&fs::read(bench.path("out/metrics.json")).unwrap()).unwrap();
+    let metrics = bench.metrics();
     let mse = |key: &str| metrics[key]["mse"]["true"][0].as_f64().unwrap();
     let mut table = csv::Reader::from_path(bench.path("out/trajectories.csv")).unwrap();
     let header = table.headers().unwrap().clone();

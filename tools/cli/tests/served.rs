@@ -20,8 +20,7 @@ fn errors(a: &str) -> [f64; 3] {
     let bench = Bench::new(plant(a));
     let run = bench.run(&["simulate", FILE, "--out", "out"]);
     assert_eq!(run.code(), 0, "{}", run.stderr());
-    let text = std::fs::read_to_string(bench.path("out/metrics.json")).unwrap();
-    let metrics: serde_json::Value = serde_json::from_str(&text).unwrap();
+    let metrics = bench.metrics();
     ["ftc", "no_ftc", "told_the_fault"].map(|name| {
         let figure = &metrics[name]["mse"]["true"][0];
         figure

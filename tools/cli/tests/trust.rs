@@ -44,8 +44,7 @@ fn ratios(design: &str) -> [f64; 2] {
     let bench = Bench::new(design);
     let run = bench.run(&["simulate", FILE, "--out", "out"]);
     assert_eq!(run.code(), 0, "{}", run.stderr());
-    let text = std::fs::read_to_string(bench.path("out/metrics.json")).unwrap();
-    let metrics: serde_json::Value = serde_json::from_str(&text).unwrap();
+    let metrics = bench.metrics();
     let error = |name: &str| -> f64 {
         let figures = metrics[name]["mse"]["true"].as_array().unwrap();
         figures.iter().map(|figure| figure.as_f64().unwrap()).sum()

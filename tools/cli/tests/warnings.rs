@@ -19,8 +19,7 @@ fn of_design(bench: &Bench) -> Vec<String> {
 fn of_run(bench: &Bench, more: &[&str]) -> Vec<String> {
     let run = bench.run(&[&["simulate", FILE, "--out", "out"], more].concat());
     assert_eq!(run.code(), 0, "{}", run.stderr());
-    let metrics = fs::read(bench.path("out/metrics.json")).unwrap();
-    let metrics: serde_json::Value = serde_json::from_slice(&metrics).unwrap();
+    let metrics = bench.metrics();
     let tried = fs::read(bench.path("out/robustness.json")).unwrap();
     let tried: serde_json::Value = serde_json::from_slice(&tried).unwrap();
     let listed = |list: &serde_json::Value| list.as_array().unwrap().clone();

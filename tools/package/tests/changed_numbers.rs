@@ -6,21 +6,15 @@
 //! promise: changed-numbers
 #![allow(missing_docs)]
 
+mod common;
+
+use common::design;
 use ftc_control::Matrix;
 use ftc_design::{Design, Proof, coverage};
 use serde_json::{Number, Value};
-use std::path::Path;
 
 /// Lists with more entries than this are sampled.
 const MOST_OF_A_LIST: usize = 12;
-
-fn design(example: &str) -> Design {
-    let path = Path::new(env!("CARGO_MANIFEST_DIR"))
-        .join("../../examples")
-        .join(example);
-    let request = design_file::read(&path).unwrap().request;
-    ftc_design::assembly::assemble(request).unwrap()
-}
 
 /// What `verify` asks of the numbers in an FMU.
 fn proves(design: &Design) -> Result<(), String> {

@@ -3,24 +3,17 @@
 //! promise: small-resource
 #![allow(missing_docs)]
 
-use ftc_design::Design;
+mod common;
+
+use common::design;
 use model_description::{read_design, write_design};
 use serde_json::Value;
-use std::path::Path;
 
 /// Bytes for names of fields, units and sizes of lists.
 const NAMES: usize = 5000;
 
 /// Bytes of a number in a list; in a matrix it has 8.
 const NUMBER: usize = 9;
-
-fn design(example: &str) -> Design {
-    let path = Path::new(env!("CARGO_MANIFEST_DIR"))
-        .join("../../examples")
-        .join(example);
-    let request = design_file::read(&path).unwrap().request;
-    ftc_design::assembly::assemble(request).unwrap()
-}
 
 /// Numbers in a value; zeros do not count, as those below the diagonal of a predictor are not written.
 fn numbers(value: &Value) -> usize {

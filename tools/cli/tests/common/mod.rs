@@ -95,6 +95,11 @@ impl Bench {
         self.folder.path().join(name)
     }
 
+    /// The figures of merit that `simulate` left in `out`.
+    pub fn metrics(&self) -> serde_json::Value {
+        serde_json::from_slice(&fs::read(self.path("out/metrics.json")).unwrap()).unwrap()
+    }
+
     /// Runs `ftc-fmu` inside the directory.
     pub fn run(&self, arguments: &[&str]) -> Outcome {
         let output = Command::new(env!("CARGO_BIN_EXE_ftc-fmu"))

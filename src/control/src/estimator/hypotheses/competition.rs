@@ -89,9 +89,15 @@ impl Candidates {
         }
     }
 
-    fn add(&mut self, candidate: Candidate) {
+    /// That `action` happened to the hypothesis in the slot `parent`.
+    fn add(&mut self, parent: usize, action: Action, score: f64, convinced: bool) {
         if let Some(entry) = self.list.get_mut(self.count) {
-            *entry = candidate;
+            *entry = Candidate {
+                score,
+                parent,
+                action,
+                convinced,
+            };
             self.count += 1;
         }
     }
@@ -131,12 +137,7 @@ impl Bank {
         let likelihood = state.seen[slot].likelihood(p);
         let square = state.seen[slot].square;
         let stay = score + likelihood;
-        state.candidates.add(Candidate {
-            score: stay,
-            parent: slot,
-            action: Action::Stay,
-            convinced,
-        });
+        state.candidates.add(slot, Action::Stay, stay, convinced);
         let unlikely = square > QUIET.min(4.0 + p as f64);
         if unlikely {
             for jump in 0..model.jumps.len() {
@@ -149,51 +150,35 @@ impl Bank {
                 };
                 let value = together * self.prices.load
                     + self.trial(state, slot, model, reading, Action::Load(jump));
-                state.candidates.add(Candidate {
-                    score: score + value,
-                    parent: slot,
-                    action: Action::Load(jump),
-                    convinced,
-                });
+                state
+                    .candidates
+                    .add(slot, Action::Load(jump), score + value, convinced);
             }
             if !loose {
                 let value =
                     self.prices.changed + self.trial(state, slot, model, reading, Action::Loosen);
-                state.candidates.add(Candidate {
-                    score: score + value,
-                    parent: slot,
-                    action: Action::Loosen,
-                    convinced,
-                });
+                state
+                    .candidates
+                    .add(slot, Action::Loosen, score + value, convinced);
             }
         }
         if loose {
-            state.candidates.add(Candidate {
-                score: score + likelihood + self.prices.release,
-                parent: slot,
-                action: Action::Tighten,
+            state.candidates.add(
+                slot,
+                Action::Tighten,
+                score + likelihood + self.prices.release,
                 convinced,
-            });
+            );
         }
         if state.first && accused == 0 {
             let value =
                 score + self.prices.fault + self.trial(state, slot, model, reading, Action::Start);
-            state.candidates.add(Candidate {
-                score: value,
-                parent: slot,
-                action: Action::Start,
-                convinced,
-            });
+            state.candidates.add(slot, Action::Start, value, convinced);
         }
         if unlikely && !state.first && state.own.displaced(&state.seen[slot].output, APART) != 0 {
             let value =
                 score + self.prices.fault + self.trial(state, slot, model, reading, Action::Home);
-            state.candidates.add(Candidate {
-                score: value,
-                parent: slot,
-                action: Action::Home,
-                convinced,
-            });
+            state.candidates.add(slot, Action::Home, value, convinced);
         }
         if accused == 0 && !state.first {
             self.propose_drift(state, slot, model, reading, stay);
@@ -213,20 +198,17 @@ impl Bank {
                 let value = score
                     + fault_price
                     + self.trial(state, slot, model, reading, Action::Accuse(1 << q));
-                state.candidates.add(Candidate {
-                    score: value,
-                    parent: slot,
-                    action: Action::Accuse(1 << q),
-                    convinced: convinced && gate(value),
-                });
+                state.candidates.add(
+                    slot,
+                    Action::Accuse(1 << q),
+                    value,
+                    convinced && gate(value),
+                );
                 let value =
                     score + fault_price + self.trial(state, slot, model, reading, Action::Scale(q));
-                state.candidates.add(Candidate {
-                    score: value,
-                    parent: slot,
-                    action: Action::Scale(q),
-                    convinced: convinced && gate(value),
-                });
+                state
+                    .candidates
+                    .add(slot, Action::Scale(q), value, convinced && gate(value));
                 if p > 2 && p <= 4 {
                     for other in 0..q {
                         if !has(free, other) {
@@ -236,12 +218,12 @@ impl Bank {
                         let value = score
                             + TOGETHER * fault_price
                             + self.trial(state, slot, model, reading, Action::Accuse(set));
-                        state.candidates.add(Candidate {
-                            score: value,
-                            parent: slot,
-                            action: Action::Accuse(set),
-                            convinced: convinced && gate(value),
-                        });
+                        state.candidates.add(
+                            slot,
+                            Action::Accuse(set),
+                            value,
+                            convinced && gate(value),
+                        );
                     }
                 }
             }
@@ -249,12 +231,9 @@ impl Bank {
                 let value = score
                     + TOGETHER * fault_price
                     + self.trial(state, slot, model, reading, Action::Accuse(free));
-                state.candidates.add(Candidate {
-                    score: value,
-                    parent: slot,
-                    action: Action::Accuse(free),
-                    convinced: convinced && gate(value),
-                });
+                state
+                    .candidates
+                    .add(slot, Action::Accuse(free), value, convinced && gate(value));
             }
         }
         for q in 0..p {
@@ -264,46 +243,37 @@ impl Bank {
                     + self.prices.stuck
                     + state.evidence_before[q]
                     + self.trial(state, slot, model, reading, Action::Freeze(q));
-                state.candidates.add(Candidate {
-                    score: value,
-                    parent: slot,
-                    action: Action::Freeze(q),
-                    convinced,
-                });
+                state
+                    .candidates
+                    .add(slot, Action::Freeze(q), value, convinced);
             }
             if has(accused & reading.valid, q) {
                 if unlikely {
                     let value = score
                         + self.prices.change
                         + self.trial(state, slot, model, reading, Action::Change(1 << q));
-                    state.candidates.add(Candidate {
-                        score: value,
-                        parent: slot,
-                        action: Action::Change(1 << q),
-                        convinced,
-                    });
+                    state
+                        .candidates
+                        .add(slot, Action::Change(1 << q), value, convinced);
                 }
                 let value = score
                     + self.prices.release
                     + self.trial(state, slot, model, reading, Action::Release(1 << q));
-                state.candidates.add(Candidate {
-                    score: value,
-                    parent: slot,
-                    action: Action::Release(1 << q),
-                    convinced: convinced || accused.count_ones() == 1,
-                });
+                state.candidates.add(
+                    slot,
+                    Action::Release(1 << q),
+                    value,
+                    convinced || accused.count_ones() == 1,
+                );
             }
         }
         if (accused & reading.valid).count_ones() > 1 {
             let value = score
                 + TOGETHER * self.prices.release
                 + self.trial(state, slot, model, reading, Action::Release(accused));
-            state.candidates.add(Candidate {
-                score: value,
-                parent: slot,
-                action: Action::Release(accused),
-                convinced: true,
-            });
+            state
+                .candidates
+                .add(slot, Action::Release(accused), value, true);
         }
     }
 
@@ -329,16 +299,16 @@ impl Bank {
         let value = self.trial(state, slot, model, reading, Action::Drift(set));
         if state.trial.square < QUIET + 2.0 * self.layout.p as f64 {
             let before = stay - state.seen[slot].likelihood(self.layout.p);
-            state.candidates.add(Candidate {
-                score: if trusted {
+            state.candidates.add(
+                slot,
+                Action::Drift(set),
+                if trusted {
                     stay.max(before + value) + 1.0
                 } else {
                     stay
                 },
-                parent: slot,
-                action: Action::Drift(set),
-                convinced: trusted,
-            });
+                trusted,
+            );
         }
     }
 
