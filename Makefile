@@ -133,7 +133,11 @@ lint: $(VENV)/ready
 # Each library crate as it would be published, built from its archive alone.
 LIBRARIES := ftc-plant ftc-control ftc-lapack ftc-design ftc-simulate ftc-identify
 
+# Cargo takes a version it has unpacked once for unchanged for ever, also from the registry that
+# it makes of these archives: what it unpacked of an earlier state goes first.
 package:
+	rm -rf target/packaged
+	rm -rf $(LIBRARIES:%="$${CARGO_HOME:-$$HOME/.cargo}"/registry/src/-*/%-[0-9]*)
 	cargo package --quiet --allow-dirty --target-dir target/packaged $(LIBRARIES:%=--package %)
 
 clean:
