@@ -1,15 +1,15 @@
 //! The competition: what may have happened, what it leaves, and who stays.
 
 use super::hypothesis::{Hypothesis, Kinds, Reading, Sensors, has};
-use super::linear::dot;
 use super::model::{Layout, ModeModel};
-use super::{APART, Bank, BankState, DISPLACED, FREEZING, KEEP, Live, RENEWED};
+use super::{Bank, BankState, KEEP, Live, RENEWED};
 use alloc::vec;
 use alloc::vec::Vec;
 use serde::{Deserialize, Serialize};
 
-/// How far below the best a hypothesis may fall before it is dropped, in log likelihood.
-const MARGIN: f64 = 25.0;
+/// How far below the best a hypothesis may fall before it is dropped, in log likelihood: the price of a
+/// fault at the usual rate and the odds of an accusation together.
+const MARGIN: f64 = 15.0;
 /// How far the explanation without sensor faults may fall: it is never forgotten.
 const MEMORY: f64 = 30.0;
 /// Hypotheses about the same sensors.
@@ -17,17 +17,17 @@ const ALIKE: usize = 2;
 /// Squared whitened innovation below which nothing but "all goes on" is considered.
 pub(super) const QUIET: f64 = 8.0;
 /// Price of several sensors at once, relative to that of one.
-const TOGETHER: f64 = 1.5;
+pub(super) const TOGETHER: f64 = 1.5;
 /// Price of all loads at once, and of a plant that is no longer the model, relative to that of one load.
 pub(super) const UNLIKE: f64 = 2.0;
 /// Price of a fault before the first sample: one sensor in a hundred.
-const AT_START: f64 = -4.6;
+pub(super) const AT_START: f64 = -4.6;
 /// Variance of loads and input gains that are said to be gone, relative to that of their jumps.
 const REMAINS: f64 = 0.01;
 /// Mean of the relative error of a sensor's wrong gain.
-const SCALE_MEAN: f64 = -0.5;
+pub(super) const SCALE_MEAN: f64 = -0.5;
 /// Its variance.
-const SCALE_VARIANCE: f64 = 0.25;
+pub(super) const SCALE_VARIANCE: f64 = 0.25;
 
 /// What may have happened since the last sample.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -61,10 +61,10 @@ pub(super) enum Action {
 /// One of them, and what it leaves.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub(super) struct Candidate {
-    score: f64,
-    parent: usize,
-    action: Action,
-    convinced: bool,
+    pub score: f64,
+    pub parent: usize,
+    pub action: Action,
+    pub convinced: bool,
 }
 
 /// Room for all that may have happened.
@@ -89,15 +89,10 @@ impl Candidates {
         }
     }
 
-    /// That `action` happened to the hypothesis in the slot `parent`.
-    fn add(&mut self, parent: usize, action: Action, score: f64, convinced: bool) {
+    /// One more.
+    pub(super) fn add(&mut self, candidate: Candidate) {
         if let Some(entry) = self.list.get_mut(self.count) {
-            *entry = Candidate {
-                score,
-                parent,
-                action,
-                convinced,
-            };
+            *entry = candidate;
             self.count += 1;
         }
     }
@@ -128,343 +123,6 @@ impl Bank {
         self.instantiate(state, model, reading);
     }
 
-    fn propose(&self, state: &mut BankState, slot: usize, model: &ModeModel, reading: Reading<'_>) {
-        let p = self.layout.p;
-        let all = if p >= 64 { u64::MAX } else { (1 << p) - 1 };
-        let h = &state.slots[slot];
-        let (score, accused, loose, convinced) = (h.score, h.accused(), h.loose, h.convinced);
-        let stuck = h.stuck;
-        let likelihood = state.seen[slot].likelihood(p);
-        let square = state.seen[slot].square;
-        let stay = score + likelihood;
-        state.candidates.add(slot, Action::Stay, stay, convinced);
-        let unlikely = square > QUIET.min(4.0 + p as f64);
-        if unlikely {
-            for jump in 0..model.jumps.len() {
-                let together = if jump == 0 {
-                    UNLIKE
-                } else if jump + 1 == model.jumps.len() {
-                    TOGETHER
-                } else {
-                    1.0
-                };
-                let value = together * self.prices.load
-                    + self.trial(state, slot, model, reading, Action::Load(jump));
-                state
-                    .candidates
-                    .add(slot, Action::Load(jump), score + value, convinced);
-            }
-            if !loose {
-                let value =
-                    self.prices.changed + self.trial(state, slot, model, reading, Action::Loosen);
-                state
-                    .candidates
-                    .add(slot, Action::Loosen, score + value, convinced);
-            }
-        }
-        if loose {
-            state.candidates.add(
-                slot,
-                Action::Tighten,
-                score + likelihood + self.prices.release,
-                convinced,
-            );
-        }
-        if state.first && accused == 0 {
-            let value =
-                score + self.prices.fault + self.trial(state, slot, model, reading, Action::Start);
-            state.candidates.add(slot, Action::Start, value, convinced);
-        }
-        if unlikely && !state.first && state.own.displaced(&state.seen[slot].output, APART) != 0 {
-            let value =
-                score + self.prices.fault + self.trial(state, slot, model, reading, Action::Home);
-            state.candidates.add(slot, Action::Home, value, convinced);
-        }
-        if accused == 0 && !state.first {
-            self.propose_drift(state, slot, model, reading, stay);
-        }
-        let free = all & !accused & reading.valid;
-        let fault_price = if state.first {
-            AT_START
-        } else {
-            self.prices.fault
-        };
-        let gate = |value: f64| self.settings.trusts_model() || value > stay;
-        if unlikely {
-            for q in 0..p {
-                if !has(free, q) {
-                    continue;
-                }
-                let value = score
-                    + fault_price
-                    + self.trial(state, slot, model, reading, Action::Accuse(1 << q));
-                state.candidates.add(
-                    slot,
-                    Action::Accuse(1 << q),
-                    value,
-                    convinced && gate(value),
-                );
-                let value =
-                    score + fault_price + self.trial(state, slot, model, reading, Action::Scale(q));
-                state
-                    .candidates
-                    .add(slot, Action::Scale(q), value, convinced && gate(value));
-                if p > 2 && p <= 4 {
-                    for other in 0..q {
-                        if !has(free, other) {
-                            continue;
-                        }
-                        let set = 1 << q | 1 << other;
-                        let value = score
-                            + TOGETHER * fault_price
-                            + self.trial(state, slot, model, reading, Action::Accuse(set));
-                        state.candidates.add(
-                            slot,
-                            Action::Accuse(set),
-                            value,
-                            convinced && gate(value),
-                        );
-                    }
-                }
-            }
-            if free.count_ones() > 1 {
-                let value = score
-                    + TOGETHER * fault_price
-                    + self.trial(state, slot, model, reading, Action::Accuse(free));
-                state
-                    .candidates
-                    .add(slot, Action::Accuse(free), value, convinced && gate(value));
-            }
-        }
-        for q in 0..p {
-            let freezes = has(all & !stuck & reading.valid, q) && state.evidence[q] > FREEZING;
-            if freezes && slot == state.live.first() {
-                let value = score
-                    + self.prices.stuck
-                    + state.evidence_before[q]
-                    + self.trial(state, slot, model, reading, Action::Freeze(q));
-                state
-                    .candidates
-                    .add(slot, Action::Freeze(q), value, convinced);
-            }
-            if has(accused & reading.valid, q) {
-                if unlikely {
-                    let value = score
-                        + self.prices.change
-                        + self.trial(state, slot, model, reading, Action::Change(1 << q));
-                    state
-                        .candidates
-                        .add(slot, Action::Change(1 << q), value, convinced);
-                }
-                let value = score
-                    + self.prices.release
-                    + self.trial(state, slot, model, reading, Action::Release(1 << q));
-                state.candidates.add(
-                    slot,
-                    Action::Release(1 << q),
-                    value,
-                    convinced || accused.count_ones() == 1,
-                );
-            }
-        }
-        if (accused & reading.valid).count_ones() > 1 {
-            let value = score
-                + TOGETHER * self.prices.release
-                + self.trial(state, slot, model, reading, Action::Release(accused));
-            state
-                .candidates
-                .add(slot, Action::Release(accused), value, true);
-        }
-    }
-
-    /// The sensors that have left the model's own run may have drifted, and no load acts. It is followed
-    /// beside the explanation by loads, so that the end of the drift is recognised; it decides only where
-    /// the model is trusted.
-    fn propose_drift(
-        &self,
-        state: &mut BankState,
-        slot: usize,
-        model: &ModeModel,
-        reading: Reading<'_>,
-        stay: f64,
-    ) {
-        let trusted = self.settings.trusts_model();
-        let limit = if trusted { DISPLACED } else { APART };
-        let set = state.own.displaced(&state.seen[slot].output, limit) & reading.valid;
-        let known =
-            |other: usize| state.slots[other].additive == set && !state.slots[other].convinced;
-        if set == 0 || !trusted && state.live.slots().any(known) {
-            return;
-        }
-        let value = self.trial(state, slot, model, reading, Action::Drift(set));
-        if state.trial.square < QUIET + 2.0 * self.layout.p as f64 {
-            let before = stay - state.seen[slot].likelihood(self.layout.p);
-            state.candidates.add(
-                slot,
-                Action::Drift(set),
-                if trusted {
-                    stay.max(before + value) + 1.0
-                } else {
-                    stay
-                },
-                trusted,
-            );
-        }
-    }
-
-    /// Log likelihood of the sample if `action` happened to the hypothesis in `slot`.
-    fn trial(
-        &self,
-        state: &mut BankState,
-        slot: usize,
-        model: &ModeModel,
-        reading: Reading<'_>,
-        action: Action,
-    ) -> f64 {
-        let layout = self.layout;
-        let Layout { n, m, p, .. } = layout;
-        let bias = self.output_error();
-        let h = &state.slots[slot];
-        let kinds = self.sets(h, action);
-        let stuck = kinds.stuck;
-        let trial = &mut state.trial;
-        trial.predict(layout, model, reading, h, kinds, bias);
-        match action {
-            Action::Load(jump) => {
-                let jump = &model.jumps[jump];
-                let variance = self.settings.gain_error * self.settings.gain_error;
-                for q in 0..p {
-                    for j in 0..=q {
-                        if !has(reading.valid & !stuck, q) || !has(reading.valid & !stuck, j) {
-                            continue;
-                        }
-                        let mut sum = jump.seen[q * p + j];
-                        for k in jump.gains.clone() {
-                            sum += variance
-                                * (model.cb[q * m + k] * state.u[k])
-                                * (model.cb[j * m + k] * state.u[k]);
-                        }
-                        trial.s[q * p + j] += sum;
-                    }
-                }
-            }
-            Action::Accuse(set) | Action::Change(set) => {
-                for q in 0..p {
-                    if has(set & reading.valid, q) {
-                        trial.s[q * p + q] +=
-                            self.settings.fault_size[q] * self.settings.fault_size[q];
-                    }
-                }
-            }
-            Action::Scale(q) => {
-                // The gain opens around its mean; nothing of the old entry counts.
-                let k = layout.fault() + q;
-                let (old, output) = (h.z[k], {
-                    let c = &model.c[q * n..(q + 1) * n];
-                    model.output_offset[q]
-                        + dot(c, &h.z[..n])
-                        + dot(
-                            &model.f[q * layout.d..(q + 1) * layout.d],
-                            &h.z[n..n + layout.d],
-                        )
-                });
-                let _ = old;
-                let factor = 1.0 + SCALE_MEAN;
-                trial.r[q] = reading.y[q] - factor * output;
-                let stride = layout.stride();
-                for j in 0..p {
-                    if !has(reading.valid, j) {
-                        continue;
-                    }
-                    let (a, b) = if j <= q { (q, j) } else { (j, q) };
-                    let mut sum = 0.0;
-                    for (i, &c) in model.c[q * n..(q + 1) * n].iter().enumerate() {
-                        let mut inner = 0.0;
-                        if j == q {
-                            for (l, &cj) in model.c[j * n..(j + 1) * n].iter().enumerate() {
-                                inner += cj * factor * h.cov[i * stride + l];
-                            }
-                        } else {
-                            inner = trial.rows[j * stride + i];
-                        }
-                        sum += factor * c * inner;
-                    }
-                    trial.s[a * p + b] = sum;
-                }
-                trial.s[q * p + q] +=
-                    output * output * SCALE_VARIANCE + reading.noise[q] * reading.noise[q];
-            }
-            Action::Freeze(q) => {
-                trial.r[q] = reading.y[q] - state.mean[q];
-                for j in 0..q {
-                    trial.s[q * p + j] = 0.0;
-                }
-                for j in q + 1..p {
-                    trial.s[j * p + q] = 0.0;
-                }
-                trial.s[q * p + q] =
-                    reading.noise[q] * reading.noise[q] * (1.0 + 1.0 / state.count[q].max(1.0));
-            }
-            Action::Start => {
-                for q in 0..p {
-                    for j in 0..=q {
-                        if !has(reading.valid, q) || !has(reading.valid, j) {
-                            continue;
-                        }
-                        let mut sum = 0.0;
-                        for k in 0..n {
-                            let sd = self.settings.start_elsewhere[k];
-                            sum += model.c[q * n + k] * model.c[j * n + k] * sd * sd;
-                        }
-                        trial.s[q * p + j] += sum;
-                    }
-                }
-            }
-            Action::Home | Action::Drift(_) => {
-                let set = if let Action::Drift(set) = action {
-                    set
-                } else {
-                    0
-                };
-                for q in 0..p {
-                    for j in 0..=q {
-                        if !has(reading.valid, q) || !has(reading.valid, j) {
-                            continue;
-                        }
-                        let mut sum = state.own.covariance(model, &self.settings, q, j);
-                        if q == j {
-                            sum += reading.noise[q] * reading.noise[q];
-                            if has(set, q) {
-                                sum += self.settings.fault_size[q] * self.settings.fault_size[q];
-                            }
-                        }
-                        trial.s[q * p + j] = sum;
-                    }
-                    trial.r[q] = if has(reading.valid, q) {
-                        reading.y[q] - state.own.y[q]
-                    } else {
-                        0.0
-                    };
-                }
-            }
-            Action::Loosen => {
-                for (i, variance) in self.looseness(model, h, &state.u).enumerate() {
-                    for q in 0..p {
-                        for j in 0..=q {
-                            if has(reading.valid & !stuck, q) && has(reading.valid & !stuck, j) {
-                                trial.s[q * p + j] +=
-                                    variance * model.c[q * n + i] * model.c[j * n + i];
-                            }
-                        }
-                    }
-                }
-            }
-            Action::Stay | Action::Tighten | Action::Release(_) => {}
-        }
-        trial.whiten(p);
-        trial.likelihood(p)
-    }
-
     /// Variance of what a plant unlike the model may have done to each state in a sample (n).
     pub(super) fn looseness<'a>(
         &'a self,
@@ -488,7 +146,7 @@ impl Bank {
         })
     }
 
-    fn sets(&self, h: &Hypothesis, action: Action) -> Kinds {
+    pub(super) fn sets(&self, h: &Hypothesis, action: Action) -> Kinds {
         let now = h.kinds();
         match action {
             Action::Stay | Action::Load(_) | Action::Loosen | Action::Tighten | Action::Start => {

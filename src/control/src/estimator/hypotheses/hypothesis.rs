@@ -244,7 +244,7 @@ impl Kinds {
         }
     }
     /// Weights of the output and of the fault's entry in the reading of sensor `q`.
-    fn weights(self, q: usize, output: f64, fault: f64, bias: bool) -> (f64, f64) {
+    pub fn weights(self, q: usize, output: f64, fault: f64, bias: bool) -> (f64, f64) {
         if has(self.stuck, q) {
             (0.0, 1.0)
         } else if has(self.scaled, q) {

@@ -16,7 +16,9 @@ mod hypothesis;
 mod linear;
 mod model;
 mod own_run;
+mod propose;
 mod start;
+mod trial;
 
 use alloc::vec::Vec;
 pub use hypothesis::{Hypothesis, Reading, Sensors, has};
@@ -30,6 +32,7 @@ use linear::dot;
 use model::ModeModel;
 use own_run::OwnRun;
 use serde::{Deserialize, Serialize};
+use trial::Outlook;
 
 /// Most hypotheses that stay after a sample.
 const KEEP: usize = 12;
@@ -141,6 +144,7 @@ pub struct BankState {
     live: Live,
     candidates: Candidates,
     scratch: Vec<f64>,
+    outlook: Outlook,
     trial: Innovation,
     mode: Option<usize>,
     /// The input that acted last (m), and how it moved (m).
@@ -190,6 +194,7 @@ crate::state!(BankState {
         seen,
         candidates,
         scratch,
+        outlook,
         trial,
         u,
         moved,

@@ -23,7 +23,7 @@ pub(super) struct OwnRun {
     pub x: Vec<f64>,
     /// Outputs (p).
     pub y: Vec<f64>,
-    /// Their variance that the model's error allows (p).
+    /// Their covariance that the model's error allows (p x p).
     bound: Vec<f64>,
     /// Variance of a reading around them (p).
     spread: Vec<f64>,
@@ -47,7 +47,7 @@ impl OwnRun {
         Self {
             x: model.x0.clone(),
             y: vec![0.0; model.bias.len()],
-            bound: vec![0.0; model.bias.len()],
+            bound: vec![0.0; model.bias.len() * model.bias.len()],
             spread: vec![0.0; model.bias.len()],
             error: allowed.clone(),
             allowed,
@@ -57,10 +57,15 @@ impl OwnRun {
     /// Outputs of the sample, with the disturbance as `z` (N) knows it, and how far readings with this
     /// `noise` (p) may be from them.
     pub fn read(&mut self, model: &ModeModel, settings: &Settings, z: &[f64], noise: &[f64]) {
-        for (q, noise) in noise.iter().enumerate().take(self.y.len()) {
+        let p = self.y.len();
+        for (q, noise) in noise.iter().enumerate().take(p) {
             self.y[q] = model.output(q, &self.x, z);
-            self.bound[q] = self.allowed(model, settings, q, q);
-            self.spread[q] = noise * noise + self.share(q) * self.bound[q];
+            for j in 0..=q {
+                let allowed = self.allowed(model, settings, q, j);
+                self.bound[q * p + j] = allowed;
+                self.bound[j * p + q] = allowed;
+            }
+            self.spread[q] = noise * noise + self.share(q) * self.bound[q * p + q];
         }
     }
 
@@ -95,8 +100,8 @@ impl OwnRun {
     }
 
     /// Covariance of the outputs `q` and `j`, by what the error has been so far.
-    pub fn covariance(&self, model: &ModeModel, settings: &Settings, q: usize, j: usize) -> f64 {
-        libm::sqrt(self.share(q) * self.share(j)) * self.allowed(model, settings, q, j)
+    pub fn covariance(&self, q: usize, j: usize) -> f64 {
+        libm::sqrt(self.share(q) * self.share(j)) * self.bound[q * self.y.len() + j]
     }
 
     /// Learns the error, given the `outputs` (p) that the leading hypothesis expects.
@@ -104,7 +109,8 @@ impl OwnRun {
         for (q, output) in outputs.iter().enumerate() {
             let off = output - self.y[q];
             self.error[q] += (bounded(off * off) - self.error[q]) / MEMORY;
-            self.allowed[q] += (bounded(self.bound[q]) - self.allowed[q]) / MEMORY;
+            let bound = self.bound[q * outputs.len() + q];
+            self.allowed[q] += (bounded(bound) - self.allowed[q]) / MEMORY;
         }
     }
 

@@ -5,6 +5,7 @@ use super::hypothesis::{Hypothesis, Innovation};
 use super::linear::{axpy, factor, solve};
 use super::model::{Layout, ModeModel};
 use super::own_run::OwnRun;
+use super::trial::Outlook;
 use super::{Bank, BankState, Live, NOISE_AT_START, NOISE_PRIOR, Prices, SLOTS};
 use crate::matrix::Matrix;
 use crate::parameters::{Hypotheses, ModeModel as Described};
@@ -233,6 +234,7 @@ impl Bank {
             live: Live::ONE,
             candidates: Candidates::new(p, model.jumps.len()),
             scratch: vec![0.0; n.max(1) * stride],
+            outlook: Outlook::new(p),
             trial: Innovation::new(layout),
             mode: None,
             u: model.u0.clone(),

@@ -1,0 +1,237 @@
+//! What may have happened to a hypothesis since the last sample.
+
+use super::competition::{AT_START, Action, Candidate, QUIET, TOGETHER, UNLIKE};
+use super::hypothesis::{Reading, Sensors, has};
+use super::model::ModeModel;
+use super::{APART, Bank, BankState, DISPLACED, FREEZING};
+
+/// The hypothesis to which something may have happened.
+#[derive(Clone, Copy)]
+struct Parent {
+    slot: usize,
+    /// Before the sample.
+    score: f64,
+    /// After it, if all goes on.
+    stay: f64,
+    accused: Sensors,
+    stuck: Sensors,
+    loose: bool,
+    convinced: bool,
+    /// Whether the sample is unlikely enough for something to have happened.
+    unlikely: bool,
+}
+
+impl Bank {
+    /// All that may have happened to the hypothesis in `slot`.
+    pub(super) fn propose(
+        &self,
+        state: &mut BankState,
+        slot: usize,
+        model: &ModeModel,
+        reading: Reading<'_>,
+    ) {
+        let p = self.layout.p;
+        let (h, seen) = (&state.slots[slot], &state.seen[slot]);
+        let parent = Parent {
+            slot,
+            score: h.score,
+            stay: h.score + seen.likelihood(p),
+            accused: h.accused(),
+            stuck: h.stuck,
+            loose: h.loose,
+            convinced: h.convinced,
+            unlikely: seen.square > QUIET.min(4.0 + p as f64),
+        };
+        state.outlook.stale = true;
+        state.candidates.add(Candidate {
+            score: parent.stay,
+            parent: slot,
+            action: Action::Stay,
+            convinced: parent.convinced,
+        });
+        self.propose_changes(state, parent, model, reading);
+        self.propose_faults(state, parent, model, reading);
+        self.propose_ends(state, parent, model, reading);
+    }
+
+    /// Adds a candidate with the logarithm of its probability; an accusation is convinced only where the
+    /// sample speaks for it at once.
+    fn consider(
+        &self,
+        state: &mut BankState,
+        parent: Parent,
+        model: &ModeModel,
+        reading: Reading<'_>,
+        (action, price, convinced): (Action, f64, bool),
+    ) {
+        let score = parent.score + price + self.trial(state, parent.slot, model, reading, action);
+        let accuses = matches!(action, Action::Accuse(_) | Action::Scale(_));
+        let at_once = !accuses || self.settings.trusts_model() || score > parent.stay;
+        state.candidates.add(Candidate {
+            score,
+            parent: parent.slot,
+            action,
+            convinced: convinced && at_once,
+        });
+    }
+
+    /// The plant: its loads, its matrices, where it started.
+    fn propose_changes(
+        &self,
+        state: &mut BankState,
+        parent: Parent,
+        model: &ModeModel,
+        reading: Reading<'_>,
+    ) {
+        let Parent {
+            slot, convinced, ..
+        } = parent;
+        let mut consider = |action: Action, price: f64| {
+            self.consider(state, parent, model, reading, (action, price, convinced));
+        };
+        let prices = self.prices;
+        if parent.unlikely {
+            for jump in 0..model.jumps.len() {
+                let together = match jump {
+                    0 => UNLIKE,
+                    _ if jump + 1 == model.jumps.len() => TOGETHER,
+                    _ => 1.0,
+                };
+                consider(Action::Load(jump), together * prices.load);
+            }
+            if !parent.loose {
+                consider(Action::Loosen, prices.changed);
+            }
+        }
+        if parent.loose {
+            consider(Action::Tighten, prices.release);
+        }
+        if state.first && parent.accused == 0 {
+            let start = (Action::Start, prices.fault, convinced);
+            self.consider(state, parent, model, reading, start);
+        }
+        if state.first {
+            return;
+        }
+        if parent.unlikely && state.own.displaced(&state.seen[slot].output, APART) != 0 {
+            let home = (Action::Home, prices.fault, convinced);
+            self.consider(state, parent, model, reading, home);
+        }
+        if parent.accused == 0 {
+            self.propose_drift(state, parent, model, reading);
+        }
+    }
+
+    /// The sensors that have left the model's own run may have drifted, and no load acts. It is followed
+    /// beside the explanation by loads, so that the end of the drift is recognised; it decides only where
+    /// the model is trusted.
+    fn propose_drift(
+        &self,
+        state: &mut BankState,
+        parent: Parent,
+        model: &ModeModel,
+        reading: Reading<'_>,
+    ) {
+        let trusted = self.settings.trusts_model();
+        let limit = if trusted { DISPLACED } else { APART };
+        let set = state.own.displaced(&state.seen[parent.slot].output, limit) & reading.valid;
+        let known =
+            |other: usize| state.slots[other].additive == set && !state.slots[other].convinced;
+        if set == 0 || !trusted && state.live.slots().any(known) {
+            return;
+        }
+        let value = self.trial(state, parent.slot, model, reading, Action::Drift(set));
+        if state.trial.square < QUIET + 2.0 * self.layout.p as f64 {
+            state.candidates.add(Candidate {
+                score: match trusted {
+                    true => parent.stay.max(parent.score + value) + 1.0,
+                    false => parent.stay,
+                },
+                parent: parent.slot,
+                action: Action::Drift(set),
+                convinced: trusted,
+            });
+        }
+    }
+
+    /// Faults that begin: of one sensor, of two where there are few, of all.
+    fn propose_faults(
+        &self,
+        state: &mut BankState,
+        parent: Parent,
+        model: &ModeModel,
+        reading: Reading<'_>,
+    ) {
+        let p = self.layout.p;
+        let free = sensors(p) & !parent.accused & reading.valid;
+        let price = if state.first {
+            AT_START
+        } else {
+            self.prices.fault
+        };
+        if !parent.unlikely {
+            return;
+        }
+        let mut consider = |action: Action, price: f64| {
+            let told = (action, price, parent.convinced);
+            self.consider(state, parent, model, reading, told);
+        };
+        for q in (0..p).filter(|&q| has(free, q)) {
+            consider(Action::Accuse(1 << q), price);
+            consider(Action::Scale(q), price);
+            if p > 2 && p <= 4 {
+                for other in (0..q).filter(|&other| has(free, other)) {
+                    consider(Action::Accuse(1 << q | 1 << other), TOGETHER * price);
+                }
+            }
+        }
+        if free.count_ones() > 1 {
+            consider(Action::Accuse(free), TOGETHER * price);
+        }
+    }
+
+    /// Faults that change their kind or their size, or end.
+    fn propose_ends(
+        &self,
+        state: &mut BankState,
+        parent: Parent,
+        model: &ModeModel,
+        reading: Reading<'_>,
+    ) {
+        let (p, prices) = (self.layout.p, self.prices);
+        let leads = parent.slot == state.live.first();
+        let known = parent.accused & reading.valid;
+        for q in 0..p {
+            let may_freeze = has(sensors(p) & !parent.stuck & reading.valid, q);
+            if may_freeze && leads && state.evidence[q] > FREEZING {
+                let price = prices.stuck + state.evidence_before[q];
+                let freeze = (Action::Freeze(q), price, parent.convinced);
+                self.consider(state, parent, model, reading, freeze);
+            }
+            if !has(known, q) {
+                continue;
+            }
+            if parent.unlikely {
+                let change = (Action::Change(1 << q), prices.change, parent.convinced);
+                self.consider(state, parent, model, reading, change);
+            }
+            let last = parent.accused.count_ones() == 1;
+            let release = (
+                Action::Release(1 << q),
+                prices.release,
+                parent.convinced || last,
+            );
+            self.consider(state, parent, model, reading, release);
+        }
+        if known.count_ones() > 1 {
+            let all = Action::Release(parent.accused);
+            let release = (all, TOGETHER * prices.release, true);
+            self.consider(state, parent, model, reading, release);
+        }
+    }
+}
+
+/// All of `p` sensors.
+const fn sensors(p: usize) -> Sensors {
+    if p >= 64 { u64::MAX } else { (1 << p) - 1 }
+}
