@@ -170,7 +170,7 @@ fn of_warning(file: &DesignFile, design: &Design, warning: &Warning) -> String {
                 Some(ObserverKind::Auto) | None => {
                     "ask for a slower observer.decay, or measure more"
                 }
-                _ => "observer.kind = \"auto\" looks for one that serves the loop better",
+                _ => "observer.kind = auto looks for one that serves the loop better",
             };
             format!(
                 "mode {}: with this observer gamma_loop is {running:.4}, {times:.1} times gamma with the state known: \
@@ -239,7 +239,7 @@ fn calmer(design: &Design) -> &'static str {
     match (control.map(|control| control.objective), alone) {
         (Some(Objective::Decay), _) => "ask for a slower decay",
         (_, Some(Weight::Input)) => {
-            "try controller.objective = \"decay\" (input_weight alone decides gamma: a larger one hardly changes the state feedback)"
+            "try controller.objective = decay (input_weight alone decides gamma: a larger one hardly changes the state feedback)"
         }
         _ => "raise controller.input_weight, ask for a slower decay",
     }
