@@ -6,7 +6,8 @@ use design_file::schema::DesignFile;
 use design_file::sentence::shorten;
 use ftc_design::state_feedback::REJECTION;
 use ftc_design::warnings::{Doubt, Guess, LoggedMovement, Warning};
-use ftc_design::{Design, Objective, Signal};
+use ftc_design::{Design, Objective};
+use ftc_plant::deviation::Destabilised;
 use ftc_simulate::Trajectory;
 use ftc_simulate::warnings::RunWarning;
 use std::fmt::Write;
@@ -63,10 +64,9 @@ const UNKNOWN_NOISE: &str = "neither scenario.noise nor estimator.threshold is g
 /// Of the runs of a design.
 pub fn of_runs(design: &Design, runs: &[Trajectory]) -> Vec<String> {
     let warnings = ftc_simulate::warnings::of_runs(design, runs);
-    let inputs = &design.signals.inputs;
     warnings
         .iter()
-        .map(|warning| of_run(inputs, warning))
+        .map(|warning| of_run(design, warning))
         .collect()
 }
 
@@ -147,7 +147,8 @@ fn of_doubt(doubt: &Doubt) -> String {
     }
 }
 
-fn of_run(inputs: &[Signal], warning: &RunWarning) -> String {
+fn of_run(design: &Design, warning: &RunWarning) -> String {
+    let inputs = &design.signals.inputs;
     let percent = |share: f64| format!("{:.1} % of the samples", 100.0 * share);
     match *warning {
         RunWarning::Unjudged {
@@ -175,6 +176,17 @@ fn of_run(inputs: &[Signal], warning: &RunWarning) -> String {
              controller.input_weight, or ask for slower decays",
             inputs[input].name,
             number(deviation)
+        ),
+        RunWarning::UnstablePlant(Destabilised {
+            mode,
+            radius,
+            model,
+        }) => format!(
+            "the true plant is unstable in mode {} ({}): the spectral radius of its A is {radius:.4}, that of the \
+             model's {model:.4}; errors of the entries of a sampled A can do that: lower them, or give the true \
+             plant's matrices themselves",
+            mode + 1,
+            design.plant.modes[mode].name
         ),
         RunWarning::Stopped { variant, time } => format!(
             "{}: the plant's equations cannot be integrated beyond {time} s: the figures end there",
