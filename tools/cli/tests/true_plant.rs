@@ -336,3 +336,24 @@ fn a_campaign_combines_its_model_error_with_the_true_plant() {
         assert_eq!(line[34..].split_whitespace().count(), 4, "{line}");
     }
 }
+
+/// A nonlinear plant has no matrices that a model error could change.
+#[test]
+fn a_model_error_of_a_nonlinear_plant_is_refused() {
+    let text = include_str!("../../../examples/converter.toml");
+    let bench = Bench::new(text);
+    let campaign = |more: &[&str]| {
+        bench.run(&[&["campaign", FILE, "--runs", "1", "--out", "out"], more].concat())
+    };
+    let run = campaign(&["--model-error", "0.1"]);
+    assert_eq!(run.code(), 2, "{}", run.stdout());
+    assert!(
+        run.stderr()
+            .contains("--model-error: model error is 0.1, but it changes matrices")
+    );
+    assert!(!bench.path("out").exists());
+    let run = campaign(&[]);
+    assert_eq!(run.code(), 0, "{}", run.stderr());
+    let page = fs::read_to_string(bench.path("out/campaign.html")).unwrap();
+    assert!(page.contains("no model error"));
+}
