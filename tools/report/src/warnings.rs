@@ -7,7 +7,8 @@ use design_file::sentence::shorten;
 use ftc_design::state_feedback::REJECTION;
 use ftc_design::warnings::{Doubt, Guess, LoggedMovement, Warning};
 use ftc_design::weights::{Weight, WeightShares};
-use ftc_design::{Design, Objective, Signal};
+use ftc_design::{Design, Objective};
+use ftc_plant::deviation::Destabilised;
 use ftc_simulate::Trajectory;
 use ftc_simulate::warnings::RunWarning;
 use std::fmt::Write;
@@ -130,11 +131,10 @@ const UNKNOWN_NOISE: &str = "neither scenario.noise nor estimator.threshold is g
 /// Of the runs of a design.
 pub fn of_runs(design: &Design, runs: &[Trajectory]) -> Vec<String> {
     let warnings = ftc_simulate::warnings::of_runs(design, runs);
-    let inputs = &design.signals.inputs;
     let calmer = calmer(design);
     warnings
         .iter()
-        .map(|warning| of_run(inputs, calmer, warning))
+        .map(|warning| of_run(design, calmer, warning))
         .collect()
 }
 
@@ -245,7 +245,8 @@ fn calmer(design: &Design) -> &'static str {
     }
 }
 
-fn of_run(inputs: &[Signal], calmer: &str, warning: &RunWarning) -> String {
+fn of_run(design: &Design, calmer: &str, warning: &RunWarning) -> String {
+    let inputs = &design.signals.inputs;
     let percent = |share: f64| format!("{:.1} % of the samples", 100.0 * share);
     match *warning {
         RunWarning::Unjudged {
@@ -273,6 +274,17 @@ fn of_run(inputs: &[Signal], calmer: &str, warning: &RunWarning) -> String {
              {calmer}, or a slower observer.decay",
             inputs[input].name,
             number(deviation)
+        ),
+        RunWarning::UnstablePlant(Destabilised {
+            mode,
+            radius,
+            model,
+        }) => format!(
+            "the true plant is unstable in mode {} ({}): the spectral radius of its A is {radius:.4}, that of the \
+             model's {model:.4}; errors of the entries of a sampled A can do that: lower them, or give the true \
+             plant's matrices themselves",
+            mode + 1,
+            design.plant.modes[mode].name
         ),
         RunWarning::Stopped { variant, time } => format!(
             "{}: the plant's equations cannot be integrated beyond {time} s: the figures end there",
