@@ -19,10 +19,11 @@ pub use draw::{Drawn, draw};
 pub use histogram::Histogram;
 pub use partial::{MergeError, Partial, merge};
 pub use run::{Outcome, Struck, run_one};
-pub use statistics::{KindStatistics, Statistics, Worst};
+pub use statistics::{Healthy, KindStatistics, Statistics, Unstable, Worst};
 
 use ftc_control::Controller;
 use ftc_design::Design;
+use ftc_plant::TruePlant;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 use std::ops::Range;
@@ -63,6 +64,32 @@ impl Options {
         Self { seed, ..self }
     }
 
+    /// These options for a design: a nonlinear plant has no matrices that could be off.
+    pub fn for_design(self, design: &Design) -> Self {
+        let model_error = match is_linear(design) {
+            true => self.model_error,
+            false => 0.0,
+        };
+        Self {
+            model_error,
+            ..self
+        }
+    }
+
+    /// Refuses a model error that the design's plant cannot have.
+    ///
+    /// # Errors
+    /// One sentence.
+    pub fn check_model_error(&self, design: &Design) -> Result<(), String> {
+        match self.model_error > 0.0 && !is_linear(design) {
+            true => Err(format!(
+                "model error is {}, but it changes matrices and the plant of this design is nonlinear: leave it out",
+                self.model_error
+            )),
+            false => Ok(()),
+        }
+    }
+
     /// Says in one sentence what is out of range.
     ///
     /// # Errors
@@ -88,6 +115,12 @@ impl Options {
         }
         Ok(())
     }
+}
+
+/// Whether the true plant has matrices of its own.
+fn is_linear(design: &Design) -> bool {
+    let (motion, _) = design.true_plant.clone().into_parts();
+    matches!(motion, TruePlant::AsDesigned | TruePlant::Linear { .. })
 }
 
 /// How a shard is watched and stopped.

@@ -7,6 +7,7 @@
 pub mod matrices;
 mod regular;
 mod resample;
+mod silent;
 mod table;
 mod time;
 

@@ -6,11 +6,11 @@ mod archive;
 mod hdf5;
 mod level5;
 
+use crate::silent::caught;
 use crate::{open_regular, quote};
 use nalgebra::DMatrix;
 use std::collections::BTreeMap;
 use std::io::Read;
-use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::Path;
 
 /// The most bytes of a file that are read: matrices of control models are small.
@@ -46,8 +46,8 @@ impl Matrices {
             ));
         }
         // The readers of damaged files are not proof against every length that a file may claim.
-        let found = catch_unwind(AssertUnwindSafe(|| parse(bytes)))
-            .unwrap_or_else(|_| Err("is damaged: save it again".into()))?;
+        let found =
+            caught(|| parse(bytes)).unwrap_or_else(|| Err("is damaged: save it again".into()))?;
         if found.is_empty() {
             return Err("holds no matrix: save A, B and C into it".into());
         }
