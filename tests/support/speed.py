@@ -153,16 +153,21 @@ def table(program: Path, folder: Path) -> str:
 
 
 def counted(program: Path, example: str, folder: Path) -> Iterator[tuple[str, int]]:
-    """Yields the instructions of a step of an example's FMUs, the estimator being the one with a reference window."""
+    """Yields the instructions of a step of an example's FMUs, the controller's once with each estimator."""
     text = (commands.ROOT / "examples" / f"{example}.toml").read_text()
-    text, once = re.subn(r'^method = "(reference|observer)"', 'method = "reference"', text, flags=re.MULTILINE)
-    if once != 1:
-        raise ValueError(f"{example}.toml does not name its estimator in one line")
-    design = folder / f"{example}.toml"
-    design.write_text(text)
-    fmus = commands.export(design, folder)
-    for name, subject in subjects(example, fmus, folder):
-        yield name, round(subject.instructions(program))
+    for method in ("reference", "observer"):
+        chosen, once = re.subn(r'^method = "(reference|observer)"', f'method = "{method}"', text, flags=re.MULTILINE)
+        if once != 1:
+            raise ValueError(f"{example}.toml does not name its estimator in one line")
+        out = folder / method
+        out.mkdir()
+        design = out / f"{example}.toml"
+        design.write_text(chosen)
+        for name, subject in subjects(example, commands.export(design, out), out):
+            if name.endswith("controller"):
+                yield f"{name}, {method}", round(subject.instructions(program))
+            elif method == "reference":
+                yield name, round(subject.instructions(program))
 
 
 def measured(program: Path, folder: Path) -> dict[str, int]:
