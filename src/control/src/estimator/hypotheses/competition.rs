@@ -198,7 +198,8 @@ impl Bank {
         (self.sets(parent, candidate.action).all(), loose)
     }
 
-    /// Keeps the best candidates, few of a kind, and always one without an accusation.
+    /// Keeps the best candidates, few of a kind, and always one in which the plant is the model and no sensor
+    /// is accused.
     fn select(&self, state: &mut BankState) {
         let order = |a: &Candidate, b: &Candidate| {
             b.score.total_cmp(&a.score).then(a.parent.cmp(&b.parent))
@@ -212,14 +213,14 @@ impl Bank {
             .map(|c| c.score)
             .fold(f64::NEG_INFINITY, f64::max);
         let mut kept = 0;
-        let (mut tight, mut loose) = (false, false);
+        let mut plain = false;
         for index in 0..state.candidates.count {
             let candidate = state.candidates.list[index];
             let kind = self.kind(state, &candidate);
-            let clean = kind.0 == 0;
-            let protect = clean && !(if kind.1 { loose } else { tight });
-            let reserved = usize::from(!tight) + usize::from(!loose);
-            if !protect && (candidate.score < best - MARGIN || kept >= KEEP - reserved) {
+            let unaccused = kind == (0, false);
+            let room = KEEP - usize::from(!plain);
+            let stays = candidate.score >= best - MARGIN && kept < room;
+            if !stays && (plain || !unaccused) {
                 continue;
             }
             let alike = state.candidates.list[..kept]
@@ -229,8 +230,7 @@ impl Bank {
             if alike >= ALIKE {
                 continue;
             }
-            tight |= clean && !kind.1;
-            loose |= clean && kind.1;
+            plain |= unaccused;
             let mut taken = candidate;
             taken.score = (candidate.score - best).clamp(-MEMORY, MEMORY);
             state.candidates.list[kept] = taken;
