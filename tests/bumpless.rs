@@ -7,9 +7,7 @@
 use ftc_control::parameters::{Compensation, EstimatorMethod};
 use ftc_control::{Compensate, Controller};
 use ftc_design::assembly::{DatabaseSource, EstimatorSpec, Request, assemble};
-use ftc_design::{
-    ControlSpec, Design, Lyapunov, Objective, ObserverChoice, ObserverSpec, Signal, Signals,
-};
+use ftc_design::{ControlSpec, Design, Lyapunov, Objective, ObserverChoice, ObserverSpec, Signals};
 use ftc_plant::scenario::{ModeInterval, Waveform};
 use ftc_plant::{Mode, OperatingPoint, Scenario, SwitchedPlant, TruePlant};
 use nalgebra::{DMatrix, DVector};
@@ -36,23 +34,9 @@ fn plant() -> SwitchedPlant {
 }
 
 fn request(lyapunov: Lyapunov, bumpless: bool) -> Request {
-    let signals = |name: &str| {
-        vec![Signal {
-            name: name.into(),
-            unit: None,
-            nominal: 1.0,
-            min: None,
-            max: None,
-        }]
-    };
     Request {
         name: "bump".into(),
-        signals: Signals {
-            inputs: signals("u"),
-            outputs: signals("y"),
-            states: signals("x"),
-            disturbances: Vec::new(),
-        },
+        signals: Signals::numbered(plant().dimensions()),
         plant: plant(),
         true_plant: TruePlant::AsDesigned,
         control: ControlSpec {

@@ -96,10 +96,8 @@ pub fn change_gains(design: &mut Design, factor: f64) {
 
 /// Whether the loop itself bears the change: the same gains told the fault do as well as before.
 pub fn bears(design: &Design) -> bool {
-    let unchanged = Design {
-        true_plant: TruePlant::AsDesigned,
-        ..design.clone()
-    };
+    let mut unchanged = design.clone();
+    unchanged.true_plant = TruePlant::AsDesigned;
     let [changed, before] = [design, &unchanged]
         .map(|design| error(design, &play(design, false, Variant::ToldTheFault)));
     changed < 1.2 * before

@@ -61,6 +61,42 @@ pub struct Clock {
     ended: u64,
 }
 
+/// Times that make no sense to a slave. All are in seconds.
+#[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum TimeError {
+    /// The start time is infinite or no number.
+    #[error("startTime is {0}: give a finite number")]
+    Start(f64),
+    /// The stop time lies before the start time.
+    #[error("stopTime {stop} lies before startTime {start}")]
+    Stop {
+        /// The stop time.
+        stop: f64,
+        /// The start time.
+        start: f64,
+    },
+    /// The length of a step is not positive and finite.
+    #[error("communicationStepSize is {0}: give a positive number of seconds")]
+    Step(f64),
+    /// A step does not begin where the last one ended.
+    #[error("currentCommunicationPoint is {from}, but the last step ended at {last}")]
+    Point {
+        /// Where it begins.
+        from: f64,
+        /// Where the last one ended.
+        last: f64,
+    },
+    /// A step leads beyond the stop time.
+    #[error("the step ends at {to}, after stopTime {stop}")]
+    BeyondStop {
+        /// Where it ends.
+        to: f64,
+        /// The stop time.
+        stop: f64,
+    },
+}
+
 /// What happens in a step, in order.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Event {
@@ -88,14 +124,17 @@ impl Clock {
     }
 
     /// Sets the start and stop time.
-    pub fn set_up(&mut self, start: f64, stop: Option<f64>) -> Result<(), String> {
+    ///
+    /// # Errors
+    /// A start time that is not finite, a stop time before it.
+    pub fn set_up(&mut self, start: f64, stop: Option<f64>) -> Result<(), TimeError> {
         if !start.is_finite() {
-            return Err(format!("startTime is {start}: give a finite number"));
+            return Err(TimeError::Start(start));
         }
         if let Some(stop) = stop
             && (stop.is_nan() || stop < start)
         {
-            return Err(format!("stopTime {stop} lies before startTime {start}"));
+            return Err(TimeError::Stop { stop, start });
         }
         *self = Self {
             start,
@@ -115,30 +154,28 @@ impl Clock {
     /// The clock after a step of length `step` from communication point `from`.
     ///
     /// The events of the step are then had from [`Clock::next_event`]. A step of more than
-    /// [`MOST_TICKS`] ticks ends after as many. Errors: a step that is not positive and finite
-    /// (the standard asks for more than 0), a point that does not continue the last, a step
-    /// beyond the stop time.
-    pub fn advanced(&self, from: f64, step: f64) -> Result<Self, String> {
+    /// [`MOST_TICKS`] ticks ends after as many.
+    ///
+    /// # Errors
+    /// A step that is not positive and finite (the standard asks for more than 0), a point that
+    /// does not continue the last, a step beyond the stop time.
+    pub fn advanced(&self, from: f64, step: f64) -> Result<Self, TimeError> {
         if !(step.is_finite() && step > 0.0) {
-            return Err(format!(
-                "communicationStepSize is {step}: give a positive number of seconds"
-            ));
+            return Err(TimeError::Step(step));
         }
         let resolution = LAST_PLACES * ulp(from) / self.sample_time;
         let gap = |last: f64| ((from - last) / self.sample_time).abs();
         let near = NEAR + resolution;
         if !(gap(self.now) <= near || gap(self.wanted) <= near) {
-            return Err(format!(
-                "currentCommunicationPoint is {from}, but the last step ended at {}",
-                self.now
-            ));
+            let last = self.now;
+            return Err(TimeError::Point { from, last });
         }
         let to = from + step;
         // A sum of steps may overshoot by its rounding errors, never by a good part of a tick.
         if let Some(stop) = self.stop
             && to - stop > 1e-3 * self.sample_time + self.steps as f64 * ulp(to)
         {
-            return Err(format!("the step ends at {to}, after stopTime {stop}"));
+            return Err(TimeError::BeyondStop { to, stop });
         }
         let most = MOST_TICKS as f64;
         let length = (((from - self.now) + step) / self.sample_time).max(0.0);

@@ -3,25 +3,19 @@
 //! promise: exact-campaign
 #![allow(missing_docs)]
 
+mod examples;
+
 use campaign::{MergeError, Options, Partial, draw, merge, run_one, run_shard, shard};
 use ftc_control::Controller;
 use ftc_design::Design;
 use ftc_plant::TruePlant;
 use proptest::prelude::*;
-use std::path::Path;
 use std::sync::OnceLock;
 
 /// The paper's example, shortened.
 fn design() -> &'static Design {
     static DESIGN: OnceLock<Design> = OnceLock::new();
-    DESIGN.get_or_init(|| {
-        let examples = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../examples");
-        let mut request = design_file::read(&examples.join("paper.toml"))
-            .unwrap()
-            .request;
-        request.scenario.steps = 300;
-        ftc_design::assembly::assemble(request).unwrap()
-    })
+    DESIGN.get_or_init(|| examples::design("paper.toml", |request| request.scenario.steps = 300))
 }
 
 fn whole() -> &'static Partial {

@@ -20,6 +20,7 @@ use ftc_design::assembly::{KnownDisturbance, Request};
 use ftc_design::{ControlSpec, Lyapunov, Objective, ObserverSpec, Signal, Signals};
 use ftc_plant::scaling::{Known, Scaling};
 use ftc_plant::{Dimensions, OperatingPoint, SwitchedPlant};
+use std::fmt::Display;
 use std::path::Path;
 
 /// The largest number of states, inputs, outputs, disturbances or modes.
@@ -84,7 +85,7 @@ pub(crate) fn request(file: &DesignFile, folder: &Path, notes: &Notes) -> Result
 }
 
 /// Puts the key before a complaint.
-pub(crate) fn at<T>(key: &str, result: Result<T, String>) -> Result<T, String> {
+pub(crate) fn at<T>(key: &str, result: Result<T, impl Display>) -> Result<T, String> {
     result.map_err(|what| format!("{key} {what}"))
 }
 
@@ -134,11 +135,9 @@ fn signals(given: &schema::Signals, found: &plant::Found) -> Result<Signals, Str
 /// The state that holds a past input.
 fn held(input: &Signal) -> Signal {
     Signal {
-        name: format!("{} held", input.name),
         unit: input.unit.clone(),
         nominal: input.nominal,
-        min: None,
-        max: None,
+        ..Signal::new(&format!("{} held", input.name))
     }
 }
 
@@ -326,8 +325,12 @@ fn tracked(given: &schema::Controller, dims: Dimensions) -> Result<Vec<usize>, S
     }
     let mut tracked = Vec::new();
     for &number in numbers {
-        let output = check::index("controller.tracked:", number, dims.outputs, "outputs")
-            .map_err(|what| what.replace(": is", " contains a number that is"))?;
+        let output = check::index("controller.tracked:", number, dims.outputs, "outputs").map_err(
+            |what| {
+                what.to_string()
+                    .replace(": is", " contains a number that is")
+            },
+        )?;
         if tracked.contains(&output) {
             return Err(format!(
                 "controller.tracked names output {number} twice: name each output once"

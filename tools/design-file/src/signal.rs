@@ -179,7 +179,7 @@ impl Signal {
     ///
     /// # Errors
     /// One sentence, to be put after the signal's key.
-    pub fn waveform(&self, tables: Tables) -> Result<Waveform, String> {
+    pub(crate) fn waveform(&self, tables: Tables) -> Result<Waveform, String> {
         let waveform = match &self.0 {
             Shape::Constant { value } => Waveform::Constant {
                 value: finite("value", *value)?,
@@ -243,7 +243,7 @@ impl Event {
     ///
     /// # Errors
     /// One sentence, to be put after the event's key.
-    pub fn fault(&self, sensors: usize) -> Result<FaultEvent, String> {
+    pub(crate) fn fault(&self, sensors: usize) -> Result<FaultEvent, String> {
         self.fault_of("sensor", sensors, "outputs")
     }
 
@@ -251,7 +251,7 @@ impl Event {
     ///
     /// # Errors
     /// One sentence, to be put after the event's key.
-    pub fn actuator_fault(&self, inputs: usize) -> Result<FaultEvent, String> {
+    pub(crate) fn actuator_fault(&self, inputs: usize) -> Result<FaultEvent, String> {
         self.fault_of("input", inputs, "inputs")
     }
 
@@ -379,13 +379,13 @@ impl Tables<'_> {
         column: &str,
         time: Option<&str>,
         interpolation: Interpolation,
-    ) -> Result<Vec<f64>, String> {
+    ) -> Result<Vec<f64>, Box<dyn std::error::Error>> {
         let mut table = Table::open(path)?;
         let names = table.names();
         let Some(at) = names.iter().position(|name| name == column) else {
             let known: Vec<&str> = names.iter().map(String::as_str).collect();
             let nearest = super::suggest::nearest(column, &known);
-            return Err(format!("has no column {column}: {nearest}"));
+            return Err(format!("has no column {column}: {nearest}").into());
         };
         let mut clock = find_time_column(names, time, &[at])?.map(Clock::new);
         let mut values = Vec::new();

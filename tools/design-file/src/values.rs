@@ -1,5 +1,6 @@
 //! Values that may be written in more than one way.
 
+use crate::check::ValueError;
 use serde::de::{Deserialize, Deserializer, Error, SeqAccess, Visitor};
 use std::fmt;
 
@@ -13,15 +14,18 @@ pub enum NumberOrList {
 }
 
 impl NumberOrList {
-    /// One value per channel; says what is wrong with the count.
-    pub fn spread(&self, channels: usize) -> Result<Vec<f64>, String> {
+    /// One value per channel.
+    ///
+    /// # Errors
+    /// A list with another length.
+    pub fn spread(&self, channels: usize) -> Result<Vec<f64>, ValueError> {
         match self {
             Self::Number(value) => Ok(vec![*value; channels]),
             Self::List(values) if values.len() == channels => Ok(values.clone()),
-            Self::List(values) => Err(format!(
-                "has {} entries: give one number, or a list of {channels}",
-                values.len()
-            )),
+            Self::List(values) => Err(ValueError::Entries {
+                found: values.len(),
+                needed: channels,
+            }),
         }
     }
 }
@@ -59,6 +63,16 @@ pub enum NameOrList {
     Name(String),
     /// One each.
     List(Vec<String>),
+}
+
+impl NameOrList {
+    /// The name for a mode (0-based); empty where the list is too short.
+    pub fn of_mode(&self, mode: usize) -> &str {
+        match self {
+            Self::Name(name) => name,
+            Self::List(names) => names.get(mode).map_or("", String::as_str),
+        }
+    }
 }
 
 impl<'de> Deserialize<'de> for NameOrList {

@@ -5,7 +5,7 @@ use crate::table::{Table, number};
 use crate::warnings;
 use ftc_control::Controller;
 use ftc_design::Design;
-use ftc_simulate::baselines::comparison;
+use ftc_simulate::baselines::comparison::{self, BaselineError};
 use ftc_simulate::closed_loop::{Merits, Record};
 use ftc_simulate::{PlantSimulator, Trajectory, Variant, run};
 use serde_json::{Map, Value, json};
@@ -23,26 +23,36 @@ pub struct Simulation {
     pub trajectories: Vec<Trajectory>,
 }
 
+/// Why a simulation leaves no files.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum SimulateError {
+    /// There is no such baseline for this design.
+    #[error(transparent)]
+    Baseline(#[from] BaselineError),
+    /// The table of trajectories cannot be written.
+    #[error(transparent)]
+    Table(#[from] csv::Error),
+}
+
 /// Runs the scenario in every variant, and with every baseline if asked for:
 /// `trajectories.csv`, `metrics.json`, `robustness.json` and the report. `warnings` are those of the design.
 ///
 /// # Errors
-/// One sentence about a baseline.
+/// A baseline that cannot be made for this design, or a table that cannot be written.
 pub fn simulate(
     design: &Design,
     mut warnings: Vec<String>,
     baselines: bool,
-) -> Result<Simulation, String> {
+) -> Result<Simulation, SimulateError> {
     let mut trajectories = trajectories(design);
     let mut bound = None;
     if baselines {
-        trajectories.extend(
-            comparison::trajectories(design, &plant(design)).map_err(|error| error.to_string())?,
-        );
+        trajectories.extend(comparison::trajectories(design, &plant(design))?);
         bound = Some(comparison::bound(design, &trajectories[0]));
     }
     warnings.extend(warnings::of_runs(design, &trajectories));
-    let csv = table(design, &trajectories).map_err(|error| error.to_string())?;
+    let csv = table(design, &trajectories)?;
     let metrics = metrics(design, &trajectories, bound.as_deref(), &warnings);
     let cases = robustness::cases(design);
     let worse = robustness::warnings(design, &cases);

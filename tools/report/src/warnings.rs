@@ -1,7 +1,6 @@
 //! The warnings of a design and of its runs, one sentence each.
 
 use crate::text::number;
-use design_file::healthy_log::file_of;
 use design_file::schema::DesignFile;
 use design_file::sentence::shorten;
 use ftc_design::state_feedback::REJECTION;
@@ -114,7 +113,7 @@ fn of_warning(file: &DesignFile, design: &Design, warning: &Warning) -> String {
             let database = file.estimator.database.as_ref();
             format!(
                 "{}: mode {} ({}), {}: {}",
-                shorten(database.map_or("", |files| file_of(files, mode))),
+                shorten(database.map_or("", |files| files.of_mode(mode))),
                 mode + 1,
                 design.plant.modes[mode].name,
                 design.signals.outputs[output].name,

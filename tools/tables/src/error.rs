@@ -51,7 +51,9 @@ pub enum Error {
     #[error("has more than {MOST_ROWS} rows: shorten it")]
     TooManyRows,
     /// A line without cells among others.
-    #[error("line {line} is empty, but more follows in line {next}: fill the gap, or delete what follows")]
+    #[error(
+        "line {line} is empty, but more follows in line {next}: fill the gap, or delete what follows"
+    )]
     EmptyLine {
         /// The line, from 1.
         line: u64,
@@ -138,9 +140,7 @@ pub enum TimeColumnError {
     #[error("has two columns that may be the time, {0} and {1}: say which by time = \"...\"")]
     Ambiguous(String, String),
     /// The unit behind the name is none that is known.
-    #[error(
-        "has the time column {0} whose unit is not known: use s, ms, us, ns, min or h"
-    )]
+    #[error("has the time column {0} whose unit is not known: use s, ms, us, ns, min or h")]
     Unit(String),
 }
 
@@ -208,7 +208,9 @@ pub enum TimeError {
 
 fn coarse(resolution: f64, sample_time: f64) -> String {
     if resolution > 0.5 * sample_time {
-        format!("; its times are printed in steps of {resolution} s, log more digits if that is why")
+        format!(
+            "; its times are printed in steps of {resolution} s, log more digits if that is why"
+        )
     } else {
         String::new()
     }

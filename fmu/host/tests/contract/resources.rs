@@ -4,7 +4,7 @@
 
 use crate::Pair;
 use fmu_host::model::location;
-use fmu_host::{Instance, Model};
+use fmu_host::{Instance, Model, NotInstantiated};
 use ftc_design::Design;
 use model_description::{DESIGN_FILE, read_design, write_design};
 use std::fs;
@@ -24,10 +24,11 @@ fn refusal(pair: &Pair, which: usize, bytes: Option<&[u8]>) -> String {
     ))
 }
 
-fn sentence(made: Result<Instance, String>) -> String {
-    let Err(message) = made else {
+fn sentence(made: Result<Instance, NotInstantiated>) -> String {
+    let Err(refused) = made else {
         panic!("an instance was made");
     };
+    let message = refused.to_string();
     assert!(message.starts_with("fmi2Instantiate: "), "{message}");
     assert_eq!(message.lines().count(), 1, "{message}");
     message

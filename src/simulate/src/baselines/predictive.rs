@@ -72,6 +72,7 @@ struct Planner {
 /// Why a mode has no predictive controller.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[error("mode {mode}: {cause}")]
+#[non_exhaustive]
 pub struct PredictiveError {
     /// The mode, from 1.
     pub mode: usize,

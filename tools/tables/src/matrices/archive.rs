@@ -1,7 +1,7 @@
 //! NumPy archives, as `numpy.savez` and `numpy.savez_compressed` write them.
 
-use crate::{EntryError, Error, MatrixError};
 use super::{Found, MOST_ENTRIES, check_shape, from_columns};
+use crate::{EntryError, Error, MatrixError};
 use nalgebra::DMatrix;
 use npyz::{DType, NpyFile, Order, TypeChar};
 use std::io::{Cursor, Read};

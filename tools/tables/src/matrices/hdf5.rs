@@ -1,7 +1,7 @@
 //! MATLAB's 7.3 format: HDF5, with the dimensions of every array in reverse order.
 
-use crate::{EntryError, Error, MatrixError};
 use super::{DEEPEST, Found, check_shape, from_columns};
+use crate::{EntryError, Error, MatrixError};
 use hdf5_pure::{Dataset, File, Group};
 use nalgebra::DMatrix;
 

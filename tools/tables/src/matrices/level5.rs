@@ -1,7 +1,7 @@
 //! MATLAB's level 5 format, which `save` writes unless told otherwise, and `scipy.io.savemat`.
 
-use crate::{EntryError, Error};
 use super::{DEEPEST, Found, check_shape, from_columns};
+use crate::{EntryError, Error};
 use matrw::{MatVariable, MatlabType, load_matfile_from_u8};
 use nalgebra::DMatrix;
 
