@@ -51,7 +51,7 @@ pub mod observer;
 mod proof;
 mod record;
 mod request;
-pub(crate) mod riccati;
+pub mod riccati;
 pub mod running_loop;
 #[cfg(feature = "solver")]
 mod solver;
