@@ -415,15 +415,14 @@ fn kalman(
         |values: &[f64]| DVector::from_iterator(values.len(), values.iter().map(|v| v * v));
     let variances = squares(&spec.noise);
     let variance = DMatrix::from_diagonal(&variances);
-    let driven =
-        &mode.e * DMatrix::from_diagonal(&squares(&spec.disturbance)) * mode.e.transpose();
+    let driven = &mode.e * DMatrix::from_diagonal(&squares(&spec.disturbance)) * mode.e.transpose();
     let floor = 1e-2 * variances.mean();
     let mut process = DMatrix::identity(n + p, n + p) * floor;
     process.view_mut((0, 0), (n, n)).add_assign(&driven);
     process.view_mut((n, n), (p, p)).copy_from(&variance);
     let reach = c.transpose() * DMatrix::from_diagonal(&variances.map(f64::recip)) * &c;
-    let covariance = riccati::solve(&a.transpose(), &reach, &process)
-        .ok_or(PredictiveCause::NotStabilisable)?;
+    let covariance =
+        riccati::solve(&a.transpose(), &reach, &process).ok_or(PredictiveCause::NotStabilisable)?;
     let innovation = &c * &covariance * c.transpose() + variance;
     let inverse = innovation
         .try_inverse()
