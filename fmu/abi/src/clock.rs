@@ -14,10 +14,10 @@
 //! plant) therefore gives the same values at common times whatever the steps: `Te/7`, `Te`,
 //! `3.5 Te`, irregular.
 //!
-//! **What is meant.** Importers round: 0.0166667 s for 1/60 s, 0.333 for a third. Time is kept
+//! **Rounding.** Importers round: 0.0166667 s for 1/60 s, 0.333 for a third. Time is kept
 //! as a whole number of ticks and a remainder of at most half a tick. Whenever the remainder is
-//! no more than [`MEANT`] of a tick (of the step, if that is longer), or the time since the start
-//! agrees and is that near to the tick, the importer meant the tick itself and the remainder is
+//! no more than [`ROUNDING_OF_TIME`] of a tick (of the step, if that is longer), or the time since the start
+//! agrees and is that near to the tick, the tick itself is taken for meant and the remainder is
 //! dropped. So a step within a thousandth of `Te`, or of a whole multiple or fraction of it, is
 //! taken for it, and ten million of them are as many ticks: nothing adds up. A start time of 1e9
 //! costs no accuracy. Time follows the importer's own communication points.
@@ -28,10 +28,10 @@
 use serde::{Deserialize, Serialize};
 
 /// A deviation, in units of `Te`, that is taken for rounding.
-pub const MEANT: f64 = 1e-3;
+pub const ROUNDING_OF_TIME: f64 = 1e-3;
 
 /// The most that is taken for rounding in a step of many ticks.
-const MOST_MEANT: f64 = 0.02;
+const MOST_ROUNDING: f64 = 0.02;
 
 /// How far a communication point may lie from the end of the last step, in units of `Te`.
 const NEAR: f64 = 1e-2;
@@ -197,7 +197,7 @@ impl Clock {
 
     /// Whether tick `k` begins after this communication point by more than is taken for rounding.
     pub fn begins_within(&self, k: u64) -> bool {
-        self.until(k) > MEANT
+        self.until(k) > ROUNDING_OF_TIME
     }
 
     /// From this communication point to the beginning of tick `k`, in units of `Te`.
@@ -277,13 +277,13 @@ impl Clock {
         let whole = (sum + 0.5).floor().max(0.0);
         self.ticks += whole as u64;
         self.remainder = sum - whole;
-        // A step no longer than its own tolerance must not be undone, else time stood still.
-        let whole_step = (MEANT * length.max(1.0)).min(MOST_MEANT);
+        // A step no longer than its own tolerance must not be undone, else time would not advance.
+        let whole_step = (ROUNDING_OF_TIME * length.max(1.0)).min(MOST_ROUNDING);
         let by_steps = (whole_step + resolution).min(length / 4.0);
-        let by_time = (MEANT + resolution).min(length / 4.0);
+        let by_time = (ROUNDING_OF_TIME + resolution).min(length / 4.0);
         let elapsed = (self.now - self.start) / self.sample_time - self.ticks as f64;
         // Steps that were taken for others have left the time since the start behind.
-        let agree = (elapsed - self.remainder).abs() <= 3.0 * MEANT;
+        let agree = (elapsed - self.remainder).abs() <= 3.0 * ROUNDING_OF_TIME;
         if self.remainder.abs() <= by_steps || (agree && elapsed.abs() <= by_time) {
             self.remainder = 0.0;
         }
@@ -291,7 +291,7 @@ impl Clock {
 
     /// A remainder that counts as none, in units of `Te`.
     fn tolerance(&self) -> f64 {
-        (MEANT + LAST_PLACES * ulp(self.now) / self.sample_time).min(0.01)
+        (ROUNDING_OF_TIME + LAST_PLACES * ulp(self.now) / self.sample_time).min(0.01)
     }
 }
 

@@ -220,7 +220,7 @@ impl<S: Slave> Component<S> {
     }
 
     /// After a panic: only free is left.
-    pub fn give_up(&mut self) {
+    pub fn make_fatal(&mut self) {
         self.current.phase = State::Fatal;
     }
 

@@ -67,7 +67,7 @@ fn run<S: Slave>(
         Ok(Ok(())) => return Status::Ok,
         Ok(Err(failure)) => (failure.status, failure.message),
         Err(panic) => {
-            component.give_up();
+            component.make_fatal();
             let why = panic_text(&*panic);
             (Status::Fatal, format!("a defect of this FMU: {why}"))
         }

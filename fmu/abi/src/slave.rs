@@ -1,4 +1,4 @@
-//! The one seam between the C interface and what an FMU computes.
+//! The boundary between the C interface and what an FMU computes.
 //!
 //! On this side: when something is computed (the life cycle, the clock), what may be set (the
 //! table), how it is saved, refused and reported. On the other side: what is computed at a
@@ -158,7 +158,8 @@ pub trait Slave: Sized + 'static {
 
     /// Whether a deserialised state has the sizes of this model.
     ///
-    /// Its bytes carry a checksum and this model's fingerprint, so a mismatch takes malice.
+    /// Its bytes carry a checksum and this model's fingerprint, so they differ only where somebody altered
+    /// them on purpose.
     /// On line, sizes are not looked at again, so every slave compares them here.
     fn fits(&self, state: &Self::State) -> bool;
 }

@@ -18,7 +18,7 @@ mod statistics;
 pub use draw::{Drawn, draw};
 pub use histogram::Histogram;
 pub use partial::{MergeError, Partial, merge};
-pub use run::{Outcome, Struck, run_one};
+pub use run::{FaultDetection, Outcome, run_one};
 pub use statistics::{KindStatistics, Statistics, Worst};
 
 use ftc_control::Controller;

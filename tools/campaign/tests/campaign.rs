@@ -39,7 +39,7 @@ fn any_number_of_threads_gives_the_same() {
 
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(6))]
-    /// To the last digit, in any order, and after a journey through JSON.
+    /// To the last digit, in any order, and written as JSON and read back.
     #[test]
     fn any_cut_in_any_order_merges_to_the_same(cuts in prop::collection::vec(0u64..=40, 1..4), turn in 0usize..4) {
         let mut ends = cuts;

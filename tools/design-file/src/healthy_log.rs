@@ -72,12 +72,12 @@ impl Logs<'_> {
                 mode + 1,
                 self.plant.modes[mode].name
             )),
-            None => self.check_alive(files, &stretches).map(|()| stretches),
+            None => self.check_moving(files, &stretches).map(|()| stretches),
         }
     }
 
     /// Refuses a sensor that says the same throughout a mode.
-    fn check_alive(&self, files: &NameOrList, stretches: &[Vec<Database>]) -> Result<(), String> {
+    fn check_moving(&self, files: &NameOrList, stretches: &[Vec<Database>]) -> Result<(), String> {
         let outputs = &self.signals.outputs;
         for (mode, stretches) in stretches.iter().enumerate() {
             let samples: usize = stretches.iter().map(Database::samples).sum();

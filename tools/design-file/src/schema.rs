@@ -351,7 +351,7 @@ pub struct Told {
     /// Seconds.
     pub from: f64,
     /// Seconds.
-    #[serde(default = "crate::signal::for_ever")]
+    #[serde(default = "crate::signal::endless")]
     pub until: f64,
     /// Number of the mode, from 1.
     pub mode: i64,
@@ -370,7 +370,7 @@ pub struct Load {
     /// Seconds.
     pub from: f64,
     /// Seconds.
-    #[serde(default = "crate::signal::for_ever")]
+    #[serde(default = "crate::signal::endless")]
     pub until: f64,
     /// What is added.
     pub size: f64,

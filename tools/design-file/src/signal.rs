@@ -42,7 +42,7 @@ enum Shape {
         slope: f64,
         #[serde(default)]
         from: f64,
-        #[serde(default = "for_ever")]
+        #[serde(default = "endless")]
         until: f64,
     },
     Table {
@@ -97,7 +97,7 @@ pub enum Event {
         #[serde(alias = "input")]
         sensor: i64,
         from: f64,
-        #[serde(default = "for_ever")]
+        #[serde(default = "endless")]
         until: f64,
         size: f64,
     },
@@ -106,7 +106,7 @@ pub enum Event {
         #[serde(alias = "input")]
         sensor: i64,
         from: f64,
-        #[serde(default = "for_ever")]
+        #[serde(default = "endless")]
         until: f64,
         slope: f64,
     },
@@ -115,7 +115,7 @@ pub enum Event {
         #[serde(alias = "input")]
         sensor: i64,
         from: f64,
-        #[serde(default = "for_ever")]
+        #[serde(default = "endless")]
         until: f64,
         loss: f64,
     },
@@ -124,7 +124,7 @@ pub enum Event {
         #[serde(alias = "input")]
         sensor: i64,
         from: f64,
-        #[serde(default = "for_ever")]
+        #[serde(default = "endless")]
         until: f64,
     },
     /// Adds `size` during the first half of each `period`.
@@ -132,7 +132,7 @@ pub enum Event {
         #[serde(alias = "input")]
         sensor: i64,
         from: f64,
-        #[serde(default = "for_ever")]
+        #[serde(default = "endless")]
         until: f64,
         size: f64,
         period: f64,
@@ -142,13 +142,13 @@ pub enum Event {
         #[serde(alias = "input")]
         sensor: i64,
         from: f64,
-        #[serde(default = "for_ever")]
+        #[serde(default = "endless")]
         until: f64,
     },
 }
 
 /// An end that never comes.
-pub(crate) fn for_ever() -> f64 {
+pub(crate) fn endless() -> f64 {
     f64::MAX
 }
 

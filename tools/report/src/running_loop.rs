@@ -60,7 +60,7 @@ pub fn stability(proof: &Proof) -> String {
 
 /// The sentence an engineer wants first: "Survives the loss of level 1; survives both by the model
 /// alone; does not survive angle".
-pub fn survival(design: &Design, proof: &Proof) -> String {
+pub fn lost_sensors(design: &Design, proof: &Proof) -> String {
     let table = &proof.running_loop.lost;
     let outputs = &design.signals.outputs;
     let all = |entry: &&LostSensors| entry.sensors.len() == outputs.len();

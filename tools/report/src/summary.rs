@@ -58,11 +58,11 @@ fn overview(design: &Design) -> Vec<(String, String)> {
     let plant = &design.plant;
     let dims = plant.dimensions();
     let names: Vec<&str> = plant.modes.iter().map(|mode| mode.name.as_str()).collect();
-    let survival = design
+    let lost_sensors = design
         .proof
         .as_ref()
-        .map(|proof| line("lost sensors", running_loop::survival(design, proof)));
-    let mut lines: Vec<_> = survival.into_iter().collect();
+        .map(|proof| line("lost sensors", running_loop::lost_sensors(design, proof)));
+    let mut lines: Vec<_> = lost_sensors.into_iter().collect();
     lines.extend([
         line("name", &design.name),
         line("sample time", format!("{} s", plant.sample_time)),

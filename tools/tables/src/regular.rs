@@ -1,4 +1,4 @@
-//! Opening files: regular ones only, and never more bytes than were bargained for.
+//! Opening files: regular ones only, and never more bytes than are allowed.
 
 use crate::Error;
 use std::fs::{self, File};
