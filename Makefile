@@ -87,6 +87,7 @@ demo: build $(VENV)/ready
 
 bench: build $(VENV)/ready
 	cargo bench --workspace
+	PYTHONPATH=tests/support:tests/reference $(IN_VENV)python tests/reference/exact_proofs.py
 	PYTHONPATH=tests/support $(IN_VENV)python tests/cvxpy/design_time.py --write docs/performance.md
 	PYTHONPATH=tests/support:tests/fmpy $(IN_VENV)python tests/support/speed.py --write docs/performance.md
 

@@ -7,7 +7,9 @@
 use ftc_control::parameters::{Compensation, EstimatorMethod};
 use ftc_control::{Compensate, Controller};
 use ftc_design::assembly::{DatabaseSource, EstimatorSpec, Request, assemble};
-use ftc_design::{ControlSpec, Design, Lyapunov, Objective, ObserverChoice, ObserverSpec, Signals};
+use ftc_design::{
+    ControlSpec, Design, Lyapunov, Objective, ObserverChoice, ObserverSpec, Signals, SwitchingGain,
+};
 use ftc_plant::scenario::{ModeInterval, Waveform};
 use ftc_plant::{Mode, OperatingPoint, Scenario, SwitchedPlant, TruePlant};
 use nalgebra::{DMatrix, DVector};
@@ -139,6 +141,17 @@ fn resets_more_often_than_proved_are_refused() {
     let proof = &mut hasty.proof.as_mut().unwrap().running_loop;
     proof.transfer.as_mut().unwrap().mu = 1.0;
     assert!(ftc_design::coverage::prove(&hasty).is_err());
+
+    // Nor does a gain across switches hold that was proved without the resets.
+    let mut claimed = design.clone();
+    claimed.proof.as_mut().unwrap().running_loop.switching = Some(SwitchingGain {
+        gamma: 1e9,
+        lyapunov: Vec::new(),
+    });
+    let sentence = ftc_design::coverage::prove(&claimed)
+        .unwrap_err()
+        .to_string();
+    assert!(sentence.contains("bumpless"), "{sentence}");
 
     let mut unproved = design;
     unproved.proof.as_mut().unwrap().running_loop.transfer = None;

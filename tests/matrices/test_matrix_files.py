@@ -191,3 +191,26 @@ def test_continuous_matrices_are_sampled_as_scipy_does(tmp_path: Path) -> None:
         found = designed('continuous = true\n[[mode]]\nfile = "plant.npz"\n', tmp_path)
         for name, wanted in (("A", a), ("B", b[:, :1]), ("E", b[:, 1:])):
             np.testing.assert_allclose(found[name], wanted, rtol=1e-11, atol=1e-13 * np.abs(wanted).max())
+
+
+@pytest.mark.parametrize("save", [savemat, savemat_compressed])
+def test_a_damaged_file_is_refused_in_one_sentence(save: Callable[[dict, Path], None], tmp_path: Path) -> None:
+    """Whatever bytes are wrong, whoever reads them: one sentence or a design, and no trace of a panic."""
+    save(MODEL, tmp_path / "plant.mat")
+    sound = (tmp_path / "plant.mat").read_bytes()
+    design = tmp_path / "design.toml"
+    design.write_text(TOP + '[[mode]]\nfile = "plant.mat"\n' + REST)
+    generator = np.random.default_rng(11)
+    for _ in range(60):
+        damaged = bytearray(sound)
+        for _ in range(generator.integers(1, 6)):
+            damaged[generator.integers(128, len(damaged))] = generator.integers(256)
+        (tmp_path / "plant.mat").write_bytes(
+            damaged[: generator.choice([len(damaged), generator.integers(130, len(damaged))])]
+        )
+        run = subprocess.run(
+            [commands.PROGRAM, "--quiet", "design", design], capture_output=True, text=True, check=False
+        )
+        assert run.returncode in (0, 1, 2), run.stderr
+        assert "panicked" not in run.stderr
+        assert len([line for line in run.stderr.splitlines() if not line.startswith("warning: ")]) <= 1, run.stderr

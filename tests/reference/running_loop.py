@@ -113,8 +113,9 @@ def channels(design: dict, index: int, lost: dict | None = None, *, exact: bool 
     silent = numbers(np.diag([1.0 if lost and k in lost["sensors"] else 0.0 for k in range(p)]))
 
     # Rows that pick each part of the state [x, acting, Z, prior, injection] and of the inputs [w, v].
-    # Without an injection its part of the state stays zero and is left out.
-    sizes = [n, m * late, q, n, n if np.any(L) else 0]
+    # Without an injection in any mode its part of the state stays zero and is left out.
+    injected = not lost and any(np.any(gain) for gain in observer["gains"])
+    sizes = [n, m * late, q, n, n if injected else 0]
     whole = numbers(np.eye(sum(sizes) + E.shape[1] + p))
     rows = np.split(whole[: sum(sizes)], np.cumsum(sizes)[:-1])
     x, acting, Z, prior, injection = rows
@@ -173,3 +174,65 @@ def detectable(A: np.ndarray, C: np.ndarray) -> bool:
         abs(pole) < 1 or np.linalg.svd(np.vstack([pole * np.eye(n) - A, C]), compute_uv=False)[n - 1] > 1e-8
         for pole in np.linalg.eigvals(A)
     )
+
+
+@dataclass(frozen=True)
+class Measured:
+    """x+ = A x + B u + E w, z = H x + D u with the augmented state [x, acting command, integral part], and u = K x."""
+
+    A: np.ndarray
+    B: np.ndarray
+    E: np.ndarray
+    H: np.ndarray
+    D: np.ndarray
+    K: np.ndarray
+
+    @property
+    def closed(self) -> tuple[np.ndarray, np.ndarray]:
+        """A + B K and H + D K."""
+        return self.A + self.B @ self.K, self.H + self.D @ self.K
+
+
+def measured(design: dict, index: int) -> Measured:
+    """Returns a mode of the augmented model with its gain, in rational numbers."""
+    plant, feedback = design["plant"], design["controller"]["feedback"]
+    mode, gains = plant["modes"][index], feedback["modes"][index]
+    A, B, C = (rationals(mode[key]) for key in "abc")
+    E, F = map(rationals, disturbance_of(plant["modes"], mode))
+    R, J = map(rationals, integral_part(feedback, plant["sample_time"]))
+    tracked, late = feedback["tracked"], feedback["latency"]
+    n, m, q = len(A), B.shape[1], len(R)
+    none = lambda rows, columns: rationals(np.zeros((rows, columns)))  # noqa: E731
+    waiting = m * late
+    if late:
+        state, command = np.hstack([A, B, none(n, q)]), none(n, m)
+    else:
+        state, command = np.hstack([A, none(n, q)]), B
+    spec = design["proof"]["state_feedback"]
+    weight = np.concatenate(
+        [spec["integral_weight"], *[np.repeat(spec["integral_weight"], 2)] * len(feedback["resonators"])]
+    )
+    seen = np.hstack([rationals(np.diag(spec["output_weight"])) @ C[tracked], none(len(tracked), waiting + q)])
+    kept = np.hstack([none(q, n + waiting), rationals(np.diag(weight))])
+    gain = [rationals(gains["state_feedback"]), rationals(gains["integral"])]
+    if late:
+        gain.insert(1, rationals(gains["previous_input"]))
+    return Measured(
+        np.vstack([state, none(waiting, n + waiting + q), np.hstack([-J @ C[tracked], none(q, waiting), R])]),
+        np.vstack([command, rationals(np.eye(waiting, m)), none(q, m)]),
+        np.vstack([E, none(waiting, E.shape[1]), -J @ F[tracked]]),
+        np.vstack([seen, kept, none(m, n + waiting + q)]),
+        np.vstack([none(len(tracked) + q, m), rationals(np.diag(spec["input_weight"]))]),
+        np.hstack(gain),
+    )
+
+
+def observer_error(design: dict, index: int, following: int) -> np.ndarray:
+    """Returns how the observer's error runs from a mode into the next, in rational numbers."""
+    observer = design["controller"]["observer"]
+    own, entered = (design["plant"]["modes"][k] for k in (index, following))
+    A, C = rationals(own["a"]), rationals(own["c"])
+    if observer["kind"] == "kalman":
+        return A - A @ rationals(observer["decoupling"][index][index]) @ C
+    H, L = rationals(observer["decoupling"][index][following]), rationals(observer["gains"][index])
+    return A - H @ rationals(entered["c"]) @ A - L @ C

@@ -62,6 +62,7 @@ mod units;
 mod verdict;
 #[cfg(feature = "solver")]
 pub mod warnings;
+pub mod weights;
 pub mod work;
 
 pub use blocks::{BlockKind, BlockName};

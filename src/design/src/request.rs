@@ -104,11 +104,7 @@ pub enum RequestError {
     )]
     NoDisturbance,
     /// The outputs do not show an eigenvalue that decays too slowly.
-    #[error(
-        "no observer of this kind reaches decay {decay} in mode {mode}: (C, T A) has an eigenvalue of magnitude \
-         {magnitude:.4} that the outputs do not show; {}",
-        undetectable(*magnitude)
-    )]
+    #[error("{}", undetectable(*mode, *decay, *magnitude, *decoupled))]
     Undetectable {
         /// The mode.
         mode: usize,
@@ -116,6 +112,8 @@ pub enum RequestError {
         decay: f64,
         /// Magnitude of the eigenvalue.
         magnitude: f64,
+        /// Whether it is decoupling the disturbance that hides it.
+        decoupled: bool,
     },
     /// A theorem as printed does not fit the plant's sizes.
     #[error(
@@ -141,10 +139,23 @@ fn entering(mode: usize, successor: usize) -> String {
     }
 }
 
-fn undetectable(magnitude: f64) -> String {
+fn undetectable(mode: usize, decay: f64, magnitude: f64, decoupled: bool) -> String {
     let above = (magnitude * 1e4).ceil() / 1e4;
-    match above < 1.0 {
-        true => format!("ask for an observer.decay above {above:.4}"),
-        false => "use a luenberger observer (observer.kind) or more sensors".into(),
-    }
+    let help = match (above < 1.0, decoupled) {
+        (true, _) => format!("ask for an observer.decay above {above:.4}"),
+        (false, true) => "use observer.kind = \"auto\" or more sensors".into(),
+        (false, false) => {
+            "no observer of any kind moves it: add a sensor that shows it, or take what grows out of the model if the \
+             plant does not have it"
+                .into()
+        }
+    };
+    let (which, whose) = match decoupled {
+        true => ("observer of this kind", "(C, T A)"),
+        false => ("observer", "A"),
+    };
+    format!(
+        "no {which} reaches decay {decay} in mode {mode}: {whose} has an eigenvalue of magnitude {magnitude:.4} that the \
+         outputs do not show; {help}"
+    )
 }

@@ -9,7 +9,7 @@
 //! the first also under arbitrary switching where one Lyapunov function gives it within
 //! [`TOLERANCE`] of what a measured state would.
 
-mod frequency;
+pub(crate) mod frequency;
 mod gain;
 mod model;
 #[cfg(feature = "solver")]
@@ -52,7 +52,8 @@ pub struct RunningLoop {
     pub noise_gain: Vec<f64>,
     /// l2 gain from a fault that is not noticed (all sensors) to the true tracking errors, per mode.
     pub fault_gain: Vec<f64>,
-    /// The first gain under arbitrary switching, where one Lyapunov function proves it.
+    /// The first gain under arbitrary switching, where one Lyapunov function proves it; none with bumpless
+    /// transfer.
     pub switching: Option<SwitchingGain>,
     /// Standard deviation of each command (m), per mode, under the noise the observer was designed
     /// for. Floating point, not proved.
@@ -331,7 +332,8 @@ impl RunningLoop {
         }
     }
 
-    /// Proves bumpless transfer of the loop as well; `false` where no proof is found.
+    /// Proves bumpless transfer of the loop as well; `false` where no proof is found. A gain across switches
+    /// is then claimed no longer: its proof knows nothing of what a switch does to the command.
     #[cfg(feature = "solver")]
     pub(crate) fn certify_transfer(
         &mut self,
@@ -340,6 +342,9 @@ impl RunningLoop {
         observer: &ObserverDesign,
     ) -> bool {
         self.transfer = transfer_synthesis::certify(&Subject::new(plant, control, observer));
+        if self.transfer.is_some() {
+            self.switching = None;
+        }
         self.transfer.is_some()
     }
 
@@ -361,6 +366,10 @@ impl RunningLoop {
             (
                 listed.eq(asked.iter()),
                 "the table of lost sensors is not the one of the plant's sensors",
+            ),
+            (
+                self.switching.is_none() || self.transfer.is_none(),
+                "a gain under arbitrary switching is claimed of a loop with bumpless transfer",
             ),
         ])
     }

@@ -19,6 +19,9 @@ const LARGEST_UNEXPLAINED: f64 = 0.3;
 /// Cosine between two responses above which they differ by their scale only.
 const SAME_SHAPE: f64 = 0.9;
 
+/// Gain of the running loop over that of a measured state above which the observer is named.
+const OBSERVER_COST: f64 = 1.5;
+
 /// What a certified design does not cover. Modes, inputs and outputs count from 0.
 #[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
@@ -39,6 +42,15 @@ pub enum Warning {
         mean: f64,
         /// What is needed, in samples.
         needed: f64,
+    },
+    /// The observer makes the gain of the running loop much larger than that of a measured state.
+    CostlyObserver {
+        /// The mode in which it does most.
+        mode: usize,
+        /// `gamma_loop` there.
+        running: f64,
+        /// Over `gamma`.
+        times: f64,
     },
     /// In steady state a reference of the scenario needs inputs that the healthy database does not
     /// span.
@@ -130,11 +142,31 @@ pub fn of_design(design: &Design, logged: Option<&LoggedMovement>) -> Vec<Warnin
     let mut warnings = Vec::new();
     warnings.extend(durations.too_short_to_judge(&design.controller.estimator));
     warnings.extend(durations.too_short_to_be_proved(design));
+    warnings.extend(costly_observer(design));
     warnings.extend(outside_the_database(design));
     if let Some(logged) = logged {
         warnings.extend(doubtful_logs(logged, design));
     }
     warnings
+}
+
+/// Where the running loop falls far behind the state feedback.
+fn costly_observer(design: &Design) -> Option<Warning> {
+    let proof = design.proof.as_ref()?;
+    let (known, running) = (
+        proof.state_feedback.gamma.as_ref()?,
+        proof.running_loop.gamma_loop.as_ref()?,
+    );
+    let times = running
+        .iter()
+        .zip(known)
+        .map(|(running, known)| running / known);
+    let (mode, times) = times.enumerate().max_by(|a, b| a.1.total_cmp(&b.1))?;
+    (times > OBSERVER_COST).then_some(Warning::CostlyObserver {
+        mode,
+        running: running[mode],
+        times,
+    })
 }
 
 /// How long modes last in the scenario: samples from one switch to the next, the first from 0.

@@ -156,7 +156,31 @@ impl fmt::Display for Port {
     }
 }
 
+/// A mode of a true plant that is unstable where the model's is not.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Destabilised {
+    /// The mode, from 0.
+    pub mode: usize,
+    /// Spectral radius of the true plant's `A`.
+    pub radius: f64,
+    /// Spectral radius of the model's.
+    pub model: f64,
+}
+
 impl SwitchedPlant {
+    /// The modes of this plant that are unstable while those of `model` are stable.
+    pub fn destabilised(&self, model: &Self) -> Vec<Destabilised> {
+        let pairs = self.modes.iter().zip(&model.modes).enumerate();
+        pairs
+            .map(|(mode, (own, nominal))| Destabilised {
+                mode,
+                radius: own.spectral_radius(),
+                model: nominal.spectral_radius(),
+            })
+            .filter(|found| found.radius >= 1.0 && found.model < 1.0)
+            .collect()
+    }
+
     /// This plant with every entry of `A`, `B` and `E` multiplied by `1 + error r`, where `r` is drawn
     /// uniformly from -1 to 1: the same for the same `seed`.
     pub fn perturbed(&self, error: f64, seed: u64) -> Self {

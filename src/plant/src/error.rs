@@ -15,8 +15,8 @@ pub enum PlantError {
     Empty(&'static str),
     /// A matrix of the first mode does not fit its `A`.
     #[error(
-        "mode 1: {matrix} is {} x {}, but with A of {states} x {states} it has to be {} x {}",
-        found.0, found.1, needed.0, needed.1
+        "mode 1: {matrix} is {} x {}, but with A of {states} x {states} it has to be {}",
+        found.0, found.1, fitting(matrix, *found, *needed, *states)
     )]
     Shape {
         /// `A`, `B`, `C`, `E` or `F`.
@@ -30,8 +30,9 @@ pub enum PlantError {
     },
     /// A matrix of a later mode does not have the size it has in the first.
     #[error(
-        "mode {mode}: {matrix} is {} x {}, but mode 1 makes it {} x {}",
-        found.0, found.1, needed.0, needed.1
+        "mode {mode}: {matrix} is {} x {}, but mode 1 makes it {} x {}{}",
+        found.0, found.1, needed.0, needed.1,
+        if (found.1, found.0) == *needed { ": it is transposed" } else { "" }
     )]
     OtherShape {
         /// The mode.
@@ -77,4 +78,31 @@ pub enum PlantError {
         /// `x`, `u` or `y`.
         part: &'static str,
     },
+}
+
+/// The size that a matrix must have beside `A`, and whether it has it once transposed.
+fn fitting(matrix: &str, found: (usize, usize), needed: (usize, usize), states: usize) -> String {
+    // The other size of these matrices was taken from their own, so a transposed one tells it wrongly.
+    let transposed = match matrix {
+        "B" | "E" if found.1 == states => Some((states, found.0)),
+        "C" if found.0 == states => Some((found.1, states)),
+        _ => None,
+    };
+    match transposed {
+        Some((rows, columns)) => format!("{rows} x {columns}: it seems to be transposed"),
+        None => format!("{} x {}", needed.0, needed.1),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::fitting;
+
+    #[test]
+    fn a_transposed_matrix_is_told_from_one_of_a_wrong_size() {
+        assert!(fitting("B", (2, 3), (3, 3), 3).starts_with("3 x 2: it seems"));
+        assert!(fitting("C", (3, 2), (3, 3), 3).starts_with("2 x 3: it seems"));
+        assert_eq!(fitting("B", (2, 2), (3, 2), 3), "3 x 2");
+        assert_eq!(fitting("A", (2, 3), (2, 2), 2), "2 x 2");
+    }
 }

@@ -6,6 +6,7 @@ use ftc_control::estimator::InputHistory;
 use ftc_control::parameters::{Estimator, EstimatorMethod};
 use ftc_design::Design;
 use ftc_plant::TruePlant;
+use ftc_plant::deviation::Destabilised;
 
 /// Share of the samples of a run that may lie outside the database without a warning.
 const SHARE_OUTSIDE: f64 = 0.05;
@@ -49,6 +50,8 @@ pub enum RunWarning {
         /// Standard deviation in physical units.
         deviation: f64,
     },
+    /// A mode of the true plant is unstable where the model's is not.
+    UnstablePlant(Destabilised),
     /// The plant's equations could not be integrated further.
     Stopped {
         /// The run.
@@ -76,12 +79,20 @@ pub fn of_runs(design: &Design, runs: &[Trajectory]) -> Vec<RunWarning> {
     let stopped = runs.iter().filter_map(|run| stopped(design, run));
     let diodes = runs.iter().filter_map(|run| diodes_conduct(design, run));
     let saturated = ftc.into_iter().flat_map(|run| saturated(design, run));
-    unjudged
+    unstable(design)
+        .chain(unjudged)
         .chain(saturated)
         .chain(noisy_commands(design))
         .chain(stopped)
         .chain(diodes)
         .collect()
+}
+
+/// Modes that the true plant's own matrices make unstable.
+fn unstable(design: &Design) -> impl Iterator<Item = RunWarning> {
+    let lost = design.true_plant.linear(&design.plant);
+    let lost = lost.destabilised(&design.plant);
+    lost.into_iter().map(RunWarning::UnstablePlant)
 }
 
 /// Inputs that spend many samples of a run at a limit.

@@ -73,6 +73,7 @@ impl Draws {
 
 /// What happens in run number `run`.
 pub fn draw(design: &Design, options: &Options, run: u64) -> Drawn {
+    let options = &options.for_design(design);
     let mut draws = Draws::new(options.seed, run);
     let base = &design.scenario;
     let schedule = schedule(design, &mut draws);
@@ -188,12 +189,14 @@ fn disturbance(signal: &Waveform, draws: &mut Draws) -> Waveform {
     }
 }
 
-/// Every entry of `A`, `B` and `E` off by a random part of `error`; a nonlinear plant stays what it is.
+/// Every entry of `A`, `B` and `E` off by a random part of `error`; a nonlinear plant stays what it is, and
+/// so does whatever else the true plant departs by.
 fn truth(design: &Design, error: f64, draws: &mut Draws) -> TruePlant {
-    let nominal = match &design.true_plant {
-        TruePlant::AsDesigned => &design.plant,
+    let (motion, deviation) = design.true_plant.clone().into_parts();
+    let nominal = match motion {
+        TruePlant::AsDesigned => design.plant.clone(),
         TruePlant::Linear { plant } => plant,
-        other => return other.clone(),
+        other => return other.with_deviation(deviation),
     };
     let mut off = |matrix: &DMatrix<f64>| {
         matrix.map(|entry| entry * (1.0 + error * draws.between([-1.0, 1.0])))
@@ -214,6 +217,7 @@ fn truth(design: &Design, error: f64, draws: &mut Draws) -> TruePlant {
             modes,
         },
     }
+    .with_deviation(deviation)
 }
 
 fn fault(design: &Design, options: &Options, draws: &mut Draws) -> FaultEvent {

@@ -19,10 +19,11 @@ pub use draw::{Drawn, draw};
 pub use histogram::Histogram;
 pub use partial::{MergeError, Partial, merge};
 pub use run::{FaultDetection, Outcome, run_one};
-pub use statistics::{KindStatistics, Statistics, Worst};
+pub use statistics::{Healthy, KindStatistics, Statistics, Unstable, Worst};
 
 use ftc_control::Controller;
 use ftc_design::Design;
+use ftc_plant::TruePlant;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 use std::ops::Range;
@@ -64,6 +65,11 @@ pub enum OptionsError {
     /// [`Options::model_error`].
     #[error("model error is {0}: give a fraction from 0 to 1")]
     ModelError(f64),
+    /// [`Options::model_error`] of a design whose plant is nonlinear.
+    #[error(
+        "model error is {0}, but it changes matrices and the plant of this design is nonlinear: leave it out"
+    )]
+    NoMatrices(f64),
     /// [`Options::largest_fault`].
     #[error("largest fault is {0}: give 1 to 1e6 thresholds")]
     LargestFault(f64),
@@ -76,6 +82,29 @@ impl Options {
     /// These options with another seed.
     pub fn with_seed(self, seed: u64) -> Self {
         Self { seed, ..self }
+    }
+
+    /// These options for a design: a nonlinear plant has no matrices that could be off.
+    pub fn for_design(self, design: &Design) -> Self {
+        let model_error = match is_linear(design) {
+            true => self.model_error,
+            false => 0.0,
+        };
+        Self {
+            model_error,
+            ..self
+        }
+    }
+
+    /// Refuses a model error that the design's plant cannot have.
+    ///
+    /// # Errors
+    /// A model error of a nonlinear plant.
+    pub fn check_model_error(&self, design: &Design) -> Result<(), OptionsError> {
+        match self.model_error > 0.0 && !is_linear(design) {
+            true => Err(OptionsError::NoMatrices(self.model_error)),
+            false => Ok(()),
+        }
     }
 
     /// Whether every option is in its range.
@@ -94,6 +123,12 @@ impl Options {
         }
         Ok(())
     }
+}
+
+/// Whether the true plant has matrices of its own.
+fn is_linear(design: &Design) -> bool {
+    let (motion, _) = design.true_plant.clone().into_parts();
+    matches!(motion, TruePlant::AsDesigned | TruePlant::Linear { .. })
 }
 
 /// How a shard is watched and stopped.

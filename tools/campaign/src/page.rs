@@ -3,6 +3,7 @@
 use crate::histogram::Histogram;
 use crate::{Partial, Statistics};
 use ftc_design::Design;
+use ftc_plant::Deviation;
 use report::figure::{Dash, Figure, Ink, Point, Series};
 use report::page::{Block, Column, KeyNumber, Page, Row, Section, Table};
 use report::text::significant;
@@ -23,34 +24,64 @@ pub fn page(design: &Design, whole: &Partial, asked: u64) -> Page {
     let statistics = &whole.statistics;
     Page {
         title: format!("{}: campaign of {} runs", design.name, statistics.runs),
-        lead: lead(whole, asked),
+        lead: lead(design, whole, asked),
         key_numbers: key_numbers(statistics),
         sections: vec![
             errors(statistics),
+            healthy(statistics),
             detection(design, statistics),
             isolation(design, statistics),
             worst(statistics, whole),
         ],
         footer: format!(
-            "Seed {}; model error up to {} %; faults up to {} thresholds, at most {} in a run. Quantiles are exact to 1 %.",
+            "Seed {}; {}; faults up to {} thresholds, at most {} in a run. Quantiles are exact to 1 %.",
             whole.options.seed,
-            100.0 * whole.options.model_error,
+            model_error(whole.options.model_error),
             whole.options.largest_fault,
             whole.options.most_faults
         ),
     }
 }
 
-fn lead(whole: &Partial, asked: u64) -> String {
+fn lead(design: &Design, whole: &Partial, asked: u64) -> String {
     let runs = whole.statistics.runs;
     let part = match runs < asked {
         true => format!(" These are {runs} of the {asked} runs that were asked for."),
         false => String::new(),
     };
+    let (_, deviation) = design.true_plant.clone().into_parts();
+    let departs = match deviation == Deviation::default() {
+        true => "",
+        false => {
+            " In every run the true plant departs from the model as [scenario.plant] says, too."
+        }
+    };
+    let error = match whole.options.model_error > 0.0 {
+        true => ", noise and an error of the model",
+        false => " and noise",
+    };
+    let unstable =
+        unstable(design, whole).map_or(String::new(), |sentence| format!(" {sentence}."));
     format!(
-        "Each run draws other faults, a schedule of modes, references, a disturbance, noise and an error of the model, and is \
-         done three times: with fault tolerance, without, and told the true fault.{part}"
+        "Each run draws other faults, a schedule of modes, references, a disturbance{error}, and is \
+         done three times: with fault tolerance, without, and told the true fault.{departs}{unstable}{part}"
     )
+}
+
+/// Runs whose true plant is unstable where the model is not, in one sentence without its end.
+pub fn unstable(design: &Design, whole: &Partial) -> Option<String> {
+    let statistics = &whole.statistics;
+    let most = statistics.most_unstable?;
+    Some(format!(
+        "In {} of {} runs the true plant is unstable where the model is not; the largest spectral radius of its A is \
+         {:.4}, in mode {} ({}) of run {}",
+        statistics.unstable_plants,
+        statistics.runs,
+        most.radius,
+        most.mode + 1,
+        design.plant.modes[most.mode].name,
+        most.run
+    ))
 }
 
 fn key_numbers(statistics: &Statistics) -> Vec<KeyNumber> {
@@ -78,7 +109,8 @@ fn key_numbers(statistics: &Statistics) -> Vec<KeyNumber> {
     ]
 }
 
-fn quantile(histogram: &Histogram, share: f64) -> String {
+/// A quantile as a person reads it.
+pub fn quantile(histogram: &Histogram, share: f64) -> String {
     match histogram.quantile(share) {
         None => "-".into(),
         Some(value) if value.is_infinite() => "unbounded".into(),
@@ -99,6 +131,13 @@ fn rate(statistics: &Statistics) -> String {
     match samples {
         0 => "-".into(),
         _ => significant(1e6 * alarms as f64 / samples as f64),
+    }
+}
+
+fn model_error(largest: f64) -> String {
+    match largest > 0.0 {
+        true => format!("model error up to {} %", 100.0 * largest),
+        false => "no model error".into(),
     }
 }
 
@@ -157,34 +196,71 @@ fn errors(statistics: &Statistics) -> Section {
         &statistics.over_told,
         f64::log10,
     ));
-    let row = |name: &str, histogram: &Histogram| Row {
-        cells: std::iter::once(name.to_string())
-            .chain(
-                QUANTILES
-                    .iter()
-                    .map(|(share, _)| quantile(histogram, *share)),
-            )
-            .collect(),
-        ..Row::default()
-    };
-    let columns = std::iter::once(Column::name("true error"))
-        .chain(QUANTILES.iter().map(|(_, name)| Column::number(*name)))
-        .collect();
     let table = Table {
         caption: "Quantiles: so many of the runs have at most this".into(),
-        columns,
+        columns: quantile_columns(),
         rows: vec![
-            row("with fault tolerance", &statistics.error),
-            row("without", &statistics.error_without),
-            row("told the fault", &statistics.error_told),
-            row("with, over told", &statistics.over_told),
-            row("with, over without", &statistics.over_none),
+            quantiles("with fault tolerance", &statistics.error),
+            quantiles("without", &statistics.error_without),
+            quantiles("told the fault", &statistics.error_told),
+            quantiles("with, over told", &statistics.over_told),
+            quantiles("with, over without", &statistics.over_none),
         ],
         notes: vec!["Root mean square over samples and tracked outputs, in nominal values.".into()],
     };
     Section::new("True error")
         .figures(vec![relative, absolute])
         .with(Block::Table(table))
+}
+
+/// What fault tolerance costs where there is nothing to tolerate.
+fn healthy(statistics: &Statistics) -> Section {
+    let healthy = &statistics.healthy;
+    let section = Section::new("Runs without a fault");
+    if healthy.runs == 0 {
+        return section.with(Block::Paragraph("There was none.".into()));
+    }
+    let figure = Figure::new(
+        "healthy",
+        "What fault tolerance costs a loop with sound sensors",
+        "log10 of the ratio of true errors",
+        "runs up to this (%)",
+    )
+    .with(
+        distribution("over none", &healthy.over_none, f64::log10)
+            .ink(Ink::Vermilion)
+            .dash(Dash::Dashed),
+    );
+    let table = Table {
+        caption: "Quantiles: so many of the runs without a fault have at most this".into(),
+        columns: quantile_columns(),
+        rows: vec![
+            quantiles("with fault tolerance", &healthy.error),
+            quantiles("with, over without", &healthy.over_none),
+        ],
+        notes: vec![format!(
+            "Of {} runs without a fault {} had a sensor accused, and in {} the true error was more than 1 % larger than \
+             without fault tolerance.",
+            healthy.runs, healthy.accused, healthy.worse_than_none
+        )],
+    };
+    section.figures(vec![figure]).with(Block::Table(table))
+}
+
+fn quantile_columns() -> Vec<Column> {
+    std::iter::once(Column::name("true error"))
+        .chain(QUANTILES.iter().map(|(_, name)| Column::number(*name)))
+        .collect()
+}
+
+fn quantiles(name: &str, histogram: &Histogram) -> Row {
+    let values = QUANTILES
+        .iter()
+        .map(|(share, _)| quantile(histogram, *share));
+    Row {
+        cells: std::iter::once(name.to_string()).chain(values).collect(),
+        ..Row::default()
+    }
 }
 
 fn detection(design: &Design, statistics: &Statistics) -> Section {
@@ -326,6 +402,7 @@ fn worst(statistics: &Statistics, whole: &Partial) -> Section {
 /// The same numbers for a program: quantiles, rates, and the parts that merge.
 pub fn json(whole: &Partial, asked: u64) -> Value {
     let statistics = &whole.statistics;
+    let healthy = &statistics.healthy;
     let quantiles = |histogram: &Histogram| {
         let of = |share: f64| histogram.quantile(share).filter(|value| value.is_finite());
         json!({ "p50": of(0.5), "p90": of(0.9), "p99": of(0.99), "max": of(1.0) })
@@ -339,6 +416,8 @@ pub fn json(whole: &Partial, asked: u64) -> Value {
             "error_told": quantiles(&statistics.error_told),
             "over_told": quantiles(&statistics.over_told),
             "over_none": quantiles(&statistics.over_none),
+            "healthy_error": quantiles(&healthy.error),
+            "healthy_over_none": quantiles(&healthy.over_none),
         },
         "campaign": whole,
     })

@@ -43,7 +43,7 @@ impl Partial {
         Self {
             design: design.name.clone(),
             fingerprint: fingerprint(design),
-            options: *options,
+            options: options.for_design(design),
             done: Vec::new(),
             statistics: Statistics::new(design.signals.outputs.len()),
         }

@@ -36,6 +36,9 @@ pub struct Outcome {
     pub model_error: f64,
     /// Noise, relative to the scenario.
     pub noise: f64,
+    /// The mode (from 0) in which the true plant is unstable while the model is not, and the spectral
+    /// radius of its `A`; of several the largest.
+    pub unstable: Option<(usize, f64)>,
 }
 
 /// One fault and whether it was seen.
@@ -108,7 +111,17 @@ pub fn run_one(design: &Design, controller: &Controller, options: &Options, run:
             _ => DIVERGED,
         }
     });
-    detection.outcome(run, error, &drawn)
+    let mut outcome = detection.outcome(run, error, &drawn);
+    outcome.unstable = unstable(design, &drawn);
+    outcome
+}
+
+/// The most unstable of the modes that the true plant's matrices make unstable.
+fn unstable(design: &Design, drawn: &Drawn) -> Option<(usize, f64)> {
+    let lost = drawn.truth.linear(&design.plant);
+    let lost = lost.destabilised(&design.plant);
+    let largest = lost.iter().max_by(|a, b| a.radius.total_cmp(&b.radius))?;
+    Some((largest.mode, largest.radius))
 }
 
 /// The squares of the true tracking errors in nominal values, added up.
@@ -203,6 +216,7 @@ impl Detection {
             switches: drawn.scenario.schedule.len() as u64 - 1,
             model_error: drawn.model_error,
             noise: drawn.noise,
+            unstable: None,
         }
     }
 }

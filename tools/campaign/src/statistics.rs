@@ -40,6 +40,12 @@ pub struct Statistics {
     pub sound_samples: Vec<u64>,
     /// Runs in which a sound sensor was accused.
     pub runs_with_false_alarm: u64,
+    /// Of the runs without a fault.
+    pub healthy: Healthy,
+    /// Runs whose true plant is unstable in a mode in which the model is not.
+    pub unstable_plants: u64,
+    /// The most unstable of these plants.
+    pub most_unstable: Option<Unstable>,
     /// The runs with the largest true error over that of the loop that is told the fault.
     pub worst: Vec<Worst>,
 }
@@ -54,6 +60,61 @@ pub struct KindStatistics {
     pub detected: u64,
     /// Samples until then, and one.
     pub delay: Histogram,
+}
+
+/// Of the runs without a fault: what fault tolerance costs a loop that needs none.
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[non_exhaustive]
+pub struct Healthy {
+    /// Runs counted.
+    pub runs: u64,
+    /// True error with fault tolerance, in nominal values (root mean square).
+    pub error: Histogram,
+    /// The same over that of the loop without fault tolerance.
+    pub over_none: Histogram,
+    /// Runs in which fault tolerance did worse than none, by more than one percent.
+    pub worse_than_none: u64,
+    /// Runs in which a sensor was accused.
+    pub accused: u64,
+}
+
+impl Healthy {
+    fn add(&mut self, error: f64, over_none: f64, accused: bool) {
+        self.runs += 1;
+        self.error.add(error);
+        self.over_none.add(over_none);
+        self.worse_than_none += u64::from(over_none > 1.0 + WORSE);
+        self.accused += u64::from(accused);
+    }
+
+    fn merge(&mut self, other: &Self) {
+        self.runs += other.runs;
+        self.error.merge(&other.error);
+        self.over_none.merge(&other.over_none);
+        self.worse_than_none += other.worse_than_none;
+        self.accused += other.accused;
+    }
+}
+
+/// A run whose true plant is unstable.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[non_exhaustive]
+pub struct Unstable {
+    /// Its number: replay it by that.
+    pub run: u64,
+    /// The mode, from 0.
+    pub mode: usize,
+    /// Spectral radius of the true plant's `A` in this mode.
+    pub radius: f64,
+}
+
+/// The larger radius; of two alike the earlier run.
+fn more_unstable(one: Unstable, other: Unstable) -> Unstable {
+    let by_radius = other.radius.total_cmp(&one.radius);
+    match by_radius.then(one.run.cmp(&other.run)).is_le() {
+        true => one,
+        false => other,
+    }
 }
 
 /// One of the worst runs.
@@ -91,9 +152,17 @@ impl Statistics {
         self.error_told.add(told);
         self.over_told.add(over_told);
         self.over_none.add(over_none);
-        if !outcome.faults.is_empty() {
+        let accused = outcome.false_alarms.iter().any(|&n| n > 0);
+        if outcome.faults.is_empty() {
+            self.healthy.add(with, over_none, accused);
+        } else {
             self.faulty_runs += 1;
             self.worse_than_none += u64::from(over_none > 1.0 + WORSE);
+        }
+        if let Some((mode, radius)) = outcome.unstable {
+            let run = outcome.run;
+            self.unstable_plants += 1;
+            self.rank_unstable(Some(Unstable { run, mode, radius }));
         }
         for fault in outcome.faults.iter().filter(|fault| !fault.hidden) {
             let kind = self.kinds.entry(fault.kind.clone()).or_default();
@@ -110,7 +179,7 @@ impl Statistics {
         }
         add_all(&mut self.false_alarms, &outcome.false_alarms);
         add_all(&mut self.sound_samples, &outcome.sound_samples);
-        self.runs_with_false_alarm += u64::from(outcome.false_alarms.iter().any(|&n| n > 0));
+        self.runs_with_false_alarm += u64::from(accused);
         self.rank([Worst {
             run: outcome.run,
             over_told,
@@ -141,7 +210,15 @@ impl Statistics {
         add_all(&mut self.false_alarms, &other.false_alarms);
         add_all(&mut self.sound_samples, &other.sound_samples);
         self.runs_with_false_alarm += other.runs_with_false_alarm;
+        self.healthy.merge(&other.healthy);
+        self.unstable_plants += other.unstable_plants;
+        self.rank_unstable(other.most_unstable);
         self.rank(other.worst.iter().cloned());
+    }
+
+    fn rank_unstable(&mut self, more: Option<Unstable>) {
+        let known = self.most_unstable.into_iter().chain(more);
+        self.most_unstable = known.reduce(more_unstable);
     }
 
     /// Keeps the worst of those known and these; of two that are equally bad the earlier run.

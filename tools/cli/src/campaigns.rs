@@ -2,6 +2,7 @@
 
 use crate::failure::Failure;
 use crate::{Made, check_output};
+use campaign::page::quantile;
 use campaign::rows::RowWriter;
 use campaign::{Options, Partial, Watch};
 use clap::Args;
@@ -58,9 +59,10 @@ pub struct Arguments {
     /// Write run number RUN sample by sample instead, as simulate does.
     #[arg(long, value_name = "RUN", conflicts_with_all = ["shard", "rows", "resume"])]
     replay: Option<u64>,
-    /// Largest relative error of the entries of A, B and E.
-    #[arg(long, default_value_t = Options::default().model_error)]
-    model_error: f64,
+    /// Largest relative error of the entries of A, B and E (sampled); 0.02 if left out, and none of a
+    /// nonlinear plant.
+    #[arg(long)]
+    model_error: Option<f64>,
     /// Largest fault, in thresholds of its sensor.
     #[arg(long, default_value_t = Options::default().largest_fault)]
     largest_fault: f64,
@@ -93,7 +95,7 @@ impl Arguments {
 
     fn options(&self) -> Options {
         let mut options = Options::default().with_seed(self.seed);
-        options.model_error = self.model_error;
+        options.model_error = self.model_error.unwrap_or(options.model_error);
         options.largest_fault = self.largest_fault;
         options.most_faults = self.most_faults;
         options
@@ -108,6 +110,10 @@ impl Arguments {
 
 /// Does the campaign and returns what to print.
 pub fn run(made: Made, arguments: &Arguments, quiet: bool) -> Result<String, Failure> {
+    if arguments.model_error.is_some() {
+        let checked = arguments.options().check_model_error(&made.design);
+        checked.map_err(|what| Failure::Input(format!("--model-error: {what}")))?;
+    }
     if let Some(run) = arguments.replay {
         return replay(made, arguments, run);
     }
@@ -131,7 +137,9 @@ pub fn run(made: Made, arguments: &Arguments, quiet: bool) -> Result<String, Fai
         .add(PAGE, page.as_bytes())
         .map_err(Failure::output_directory)?;
     staging.commit().map_err(Failure::output_directory)?;
-    Ok(summary(&whole, asked, &arguments.out))
+    let mut warnings = made.warnings;
+    warnings.extend(campaign::page::unstable(&made.design, &whole).map(small));
+    Ok(summary(&whole, asked, &arguments.out) + &report::warnings::text(&warnings))
 }
 
 /// A run of the campaign, sample by sample.
@@ -323,8 +331,15 @@ fn lines(watch: &Watch, count: u64, over: &std::sync::atomic::AtomicBool) {
 fn summary(whole: &Partial, asked: u64, out: &Path) -> String {
     let statistics = &whole.statistics;
     let mut text = format!(
-        "{}: {} runs\n\n{:<34}{:>12}{:>12}{:>12}{:>12}\n",
-        whole.design, statistics.runs, "true error", "half", "90 %", "99 %", "worst"
+        "{}: {} runs, of which {} without a fault\n\n{:<34}{:>12}{:>12}{:>12}{:>12}\n",
+        whole.design,
+        statistics.runs,
+        statistics.healthy.runs,
+        "true error",
+        "half",
+        "90 %",
+        "99 %",
+        "worst"
     );
     for (name, histogram) in [
         ("with fault tolerance", &statistics.error),
@@ -332,11 +347,14 @@ fn summary(whole: &Partial, asked: u64, out: &Path) -> String {
         ("told the fault", &statistics.error_told),
         ("with, over told", &statistics.over_told),
         ("with, over without", &statistics.over_none),
+        (
+            "with, over without, no fault",
+            &statistics.healthy.over_none,
+        ),
     ] {
         let _ = write!(text, "{name:<34}");
         for share in [0.5, 0.9, 0.99, 1.0] {
-            let value = histogram.quantile(share).unwrap_or(f64::NAN);
-            let _ = write!(text, "{value:>12.4}");
+            let _ = write!(text, " {:>11}", quantile(histogram, share));
         }
         text.push('\n');
     }
@@ -359,4 +377,12 @@ fn summary(whole: &Partial, asked: u64, out: &Path) -> String {
         );
     }
     text
+}
+
+/// A sentence after the word that comes before its first one.
+fn small(sentence: String) -> String {
+    let mut letters = sentence.chars();
+    letters.next().map_or(String::new(), |first| {
+        first.to_lowercase().chain(letters).collect()
+    })
 }

@@ -1085,3 +1085,164 @@ fn a_command_line_without_sense() {
         assert_eq!(bench.run(arguments).code(), 2, "{arguments:?}");
     }
 }
+
+/// What is wrong inside a table with a kind is told by its key, and no type of this program is named.
+#[test]
+fn keys_inside_kinds() {
+    let event = "kind = \"stuck\", sensor = 1, from = 50";
+    let square = "kind = \"square\", amplitude = 1, period = 20";
+    all_refused(&[
+        (
+            "an event that is a number",
+            "events = [{ kind = \"stuck\", sensor = 1, from = 50 }]",
+            "events = [3]",
+            &[
+                "line",
+                "scenario.events[1]",
+                "the integer `3`, expected a table",
+            ],
+        ),
+        (
+            "a size that is a text",
+            event,
+            "kind = \"bias\", sensor = 1, from = 50, size = \"x\"",
+            &["line", "scenario.events[1].size", "expected a number"],
+        ),
+        (
+            "a bias without size",
+            event,
+            "kind = \"bias\", sensor = 1, from = 50",
+            &["scenario.events[1]: size is missing: add it"],
+        ),
+        (
+            "a size of what has none",
+            event,
+            "kind = \"stuck\", sensor = 1, from = 50, size = 2",
+            &["scenario.events[1]: size says nothing about kind = \"stuck\""],
+        ),
+        (
+            "a fault of a sensor that is not there",
+            event,
+            "kind = \"stuck\", sensor = \"c\", from = 50",
+            &["scenario.events[1]: sensor is \"c\"", "use one of a, b"],
+        ),
+        (
+            "a fault of nothing",
+            event,
+            "kind = \"stuck\", from = 50",
+            &["scenario.events[1]: sensor is missing: add its number or its name"],
+        ),
+        (
+            "a fault of a sensor and an input",
+            event,
+            "kind = \"stuck\", from = 50, sensor = 1, input = 1",
+            &["scenario.events[1]: sensor and input are both given"],
+        ),
+        (
+            "a period that is a text",
+            square,
+            "kind = \"square\", amplitude = 1, period = \"x\"",
+            &["line", "scenario.reference[2].period", "expected a number"],
+        ),
+        (
+            "a square with points",
+            square,
+            "kind = \"square\", amplitude = 1, period = 20, points = [[0, 1]]",
+            &["scenario.reference[2]: points says nothing about kind = \"square\""],
+        ),
+        (
+            "tracked by an unknown name",
+            "tracked = [1, 2]",
+            "tracked = [\"a\", \"bb\"]",
+            &[
+                "controller.tracked contains an entry that is \"bb\"",
+                "did you mean b?",
+            ],
+        ),
+        (
+            "tracked twice by number and name",
+            "tracked = [1, 2]",
+            "tracked = [1, \"a\"]",
+            &["controller.tracked names output \"a\" twice"],
+        ),
+        (
+            "a mode of an unknown name",
+            "mode = 2 }",
+            "mode = \"third\" }",
+            &[
+                "scenario.schedule[2].mode is \"third\"",
+                "use one of first, second",
+            ],
+        ),
+        (
+            "a table where a text belongs",
+            "kind = \"uio\"",
+            "kind = 3",
+            &["observer.kind", "expected a text"],
+        ),
+        (
+            "a scenario that is a number",
+            "steps = 60",
+            "steps = 60\nplant = 3",
+            &["scenario.plant", "expected a table"],
+        ),
+        (
+            "an actuator's fault of nothing",
+            "steps = 60",
+            "steps = 60\nplant = { actuator = [{ kind = \"stuck\", from = 5 }] }",
+            &["scenario.plant.actuator[1]: input is missing"],
+        ),
+        (
+            "B transposed",
+            "B = [[0.0, 1.0], [1.0, 0.0]]",
+            "B = [[0.0, 1.0]]",
+            &["mode 1: B is 1 x 2", "2 x 1: it seems to be transposed"],
+        ),
+    ]);
+}
+
+/// Names stand wherever numbers do, and mean the same.
+#[test]
+fn names_mean_the_same_as_numbers() {
+    let named = SOUND
+        .replace("tracked = [1, 2]", "tracked = [\"a\", \"b\"]")
+        .replace("mode = 1 }", "mode = \"first\" }")
+        .replace("mode = 2 }", "mode = \"second\" }")
+        .replace("sensor = 1", "sensor = \"a\"");
+    let truth = |input: &str, load: &str, state: &str, told: &str| {
+        format!(
+            "[scenario.plant]\nactuator = [{{ kind = \"stuck\", input = {input}, from = 9, until = 12 }}]\n\
+             loads = [{{ disturbance = {load}, from = 3, size = 0.1 }}, {{ state = {state}, from = 5, size = 0.1 }}]\n\
+             told = [{{ mode = {told}, from = 40, until = 42 }}]\n"
+        )
+    };
+    let trajectories = |design: String| {
+        let bench = Bench::new(design);
+        let run = bench.run(&["simulate", FILE, "--out", "out"]);
+        assert_eq!(run.code(), 0, "{}", run.stderr());
+        std::fs::read(bench.path("out/trajectories.csv")).unwrap()
+    };
+    let numbered = trajectories(SOUND.to_string() + &truth("2", "1", "2", "1"));
+    let named = trajectories(named + &truth("\"u[2]\"", "\"w[1]\"", "\"x[2]\"", "\"first\""));
+    assert!(numbered == named);
+}
+
+/// A mode that grows and is not shown has no observer, of whatever kind: no other kind is advised.
+#[test]
+fn an_unstable_mode_that_no_sensor_shows() {
+    for kind in ["uio", "luenberger", "kalman", "auto"] {
+        let design = format!(
+            "name = \"grows\"\nsample_time = 1.0\n[[mode]]\nA = [[0.6, 0.0], [0.1, 1.2]]\n\
+             B = [[1.0, 0.0], [0.0, 1.0]]\nC = [[1.0, 0.0]]\nE = [[1.0], [0.0]]\n\
+             [observer]\nkind = \"{kind}\"\n"
+        );
+        let run = Bench::new(design).run(&["design", FILE]);
+        let message = run.stderr();
+        assert_ne!(run.code(), 0, "{kind}");
+        assert!(
+            message.contains("add a sensor that shows it"),
+            "{kind}: {message}"
+        );
+        assert!(!message.contains("use a luenberger"), "{kind}: {message}");
+    }
+}

@@ -220,3 +220,140 @@ fn simulate_tries_other_plants() {
         }
     }
 }
+
+/// The matrices of the true plant are in samples or continuous, as the file's or as they say themselves.
+#[test]
+fn the_true_plant_s_matrices_may_be_of_the_other_kind() {
+    // dx/dt = -0.5 x + u, held for one second.
+    let decay = (-0.5f64).exp();
+    let gain = (1.0 - decay) / 0.5;
+    let continuous = "A = [[-0.5, 0.0], [0.0, -0.5]]\nB = [[1.0, 0.0], [0.0, 1.0]]";
+    let sampled =
+        format!("A = [[{decay:?}, 0.0], [0.0, {decay:?}]], B = [[{gain:?}, 0.0], [0.0, {gain:?}]]");
+    let of = |plant: &str| column(&trajectories(plant), "ftc.y_true[1]");
+    let e = "E = [[0.1], [0.1]]";
+    let same =
+        |one: &[f64], other: &[f64]| one.iter().zip(other).all(|(a, b)| (a - b).abs() < 1e-9);
+    let (inline, disturbed) = (continuous.replace('\n', ", "), e);
+    assert!(same(
+        &of(&format!("mode = [{{ {sampled} }}]")),
+        &of(&format!(
+            "continuous = true\nmode = [{{ {inline}, {disturbed} }}]"
+        )),
+    ));
+    // The same in a file that is continuous itself.
+    let other = DESIGN
+        .replace("sample_time = 1.0", "sample_time = 1.0\ncontinuous = true")
+        .replace(
+            "A = [[0.6, 0.1], [0.0, 0.5]]\nB = [[1.0, 0.0], [0.0, 1.0]]",
+            continuous,
+        );
+    let run = |plant: &str| {
+        let bench = Bench::new(format!("{other}\n[scenario.plant]\n{plant}\n"));
+        let run = bench.run(&["simulate", FILE, "--out", "out"]);
+        (
+            run.code(),
+            run.stderr(),
+            fs::read(bench.path("out/trajectories.csv")).ok(),
+        )
+    };
+    let (code, message, _) = run(&format!("continuous = false\nmode = [{{ {sampled} }}]"));
+    assert_eq!(code, 2);
+    assert!(
+        message.contains("scenario.plant: mode 1: E is missing"),
+        "{message}"
+    );
+    let (code, message, _) = run(&format!(
+        "continuous = false\nmode = [{{ {sampled}, {e} }}]"
+    ));
+    assert_eq!(code, 0, "{message}");
+    let (code, message, _) = run("continuous = false");
+    assert_eq!(code, 2);
+    assert!(
+        message.contains("scenario.plant.continuous is about scenario.plant.mode"),
+        "{message}"
+    );
+}
+
+/// What makes the true plant unstable, or never happens, is said.
+#[test]
+fn an_unstable_true_plant_and_what_comes_too_late_are_warned_of() {
+    let out = |plant: &str| {
+        let bench = Bench::new(format!("{DESIGN}\n[scenario.plant]\n{plant}\n"));
+        let run = bench.run(&["simulate", FILE, "--out", "out"]);
+        assert_eq!(run.code(), 0, "{}", run.stderr());
+        run.stdout()
+    };
+    let text = out("mode = [{ A = [[1.05, 0.0], [0.0, 0.5]] }]");
+    let words = "warning: the true plant is unstable in mode 1 (mode 1): the spectral radius of its A is 1.0500, that of the \
+                 model's 0.6000";
+    assert!(text.contains(words), "{text}");
+    let text = out("loads = [{ input = 1, from = 200, size = 0.1 }]");
+    assert!(
+        text.contains(
+            "warning: scenario.plant.loads[1]: it begins at 200 s, but the scenario ends at 200 s"
+        ),
+        "{text}"
+    );
+    let text = out("loads = [{ input = 1, from = 199, size = 0.1 }]");
+    assert!(
+        !text.contains("it never acts") && !text.contains("unstable"),
+        "{text}"
+    );
+}
+
+/// A campaign's model error comes on top of what the true plant departs by, or is refused.
+#[test]
+fn a_campaign_combines_its_model_error_with_the_true_plant() {
+    let campaign = |design: &str, more: &[&str]| {
+        let bench = Bench::new(design);
+        let arguments = [&["campaign", FILE, "--runs", "24", "--out", "out"], more].concat();
+        let run = bench.run(&arguments);
+        let page = fs::read_to_string(bench.path("out/campaign.html")).unwrap_or_default();
+        (run.code(), run.stdout() + &run.stderr(), page)
+    };
+    let weak = format!(
+        "{DESIGN}\n[scenario.plant]\ninput_gain = 0.7\nmode = [{{ A = [[0.95, 0.1], [0.0, 0.5]] }}]\n"
+    );
+    let figures = |text: &str| text.lines().take(10).map(String::from).collect::<Vec<_>>();
+    let (code, exact, page) = campaign(&weak, &["--model-error", "0"]);
+    assert_eq!(code, 0, "{exact}");
+    assert!(page.contains("as [scenario.plant] says") && page.contains("no model error"));
+    let (code, off, page) = campaign(&weak, &["--model-error", "0.9"]);
+    assert_eq!(code, 0, "{off}");
+    assert!(page.contains("model error up to 90 %") && page.contains("Runs without a fault"));
+    assert_ne!(figures(&exact), figures(&off));
+    assert!(
+        off.contains("true plant is unstable where the model is not"),
+        "{off}"
+    );
+    assert!(!exact.contains("unstable"), "{exact}");
+    // No two columns run together, whatever stands in them.
+    for line in off
+        .lines()
+        .filter(|line| line.starts_with("with") || line.starts_with("told"))
+    {
+        assert_eq!(line[34..].split_whitespace().count(), 4, "{line}");
+    }
+}
+
+/// A nonlinear plant has no matrices that a model error could change.
+#[test]
+fn a_model_error_of_a_nonlinear_plant_is_refused() {
+    let text = include_str!("../../../examples/converter.toml");
+    let bench = Bench::new(text);
+    let campaign = |more: &[&str]| {
+        bench.run(&[&["campaign", FILE, "--runs", "1", "--out", "out"], more].concat())
+    };
+    let run = campaign(&["--model-error", "0.1"]);
+    assert_eq!(run.code(), 2, "{}", run.stdout());
+    assert!(
+        run.stderr()
+            .contains("--model-error: model error is 0.1, but it changes matrices")
+    );
+    assert!(!bench.path("out").exists());
+    let run = campaign(&[]);
+    assert_eq!(run.code(), 0, "{}", run.stderr());
+    let page = fs::read_to_string(bench.path("out/campaign.html")).unwrap();
+    assert!(page.contains("no model error"));
+}

@@ -346,3 +346,127 @@ fn weights_act_without_a_known_disturbance() {
         "the weights shape nothing"
     );
 }
+
+/// An unstable pitch axis without E: its input's gain alone decides gamma, so no weight moves the gains.
+#[test]
+fn weights_that_shape_the_gains_hardly_are_named() {
+    let pitch = |weights: &str| {
+        format!(
+            r#"name = "pitch"
+sample_time = 0.05
+[[mode]]
+A = [[0.951, 0.043], [0.039, 0.948]]
+B = [[-0.0003], [-0.0086]]
+C = [[0.0, 1.0], [1.0, 0.0]]
+[signals]
+inputs = [{{ name = "elevator", nominal = 2.0, min = -25.0, max = 25.0 }}]
+outputs = [{{ name = "q", nominal = 5.0 }}, {{ name = "alpha", nominal = 3.0 }}]
+[controller]
+tracked = [1]
+decay = 0.98
+{weights}
+[observer]
+decay = 0.95
+[scenario]
+steps = 200
+noise = [0.1, 0.1]
+reference = [0.0]
+"#
+        )
+    };
+    let gamma = |weights: &str| {
+        let bench = Bench::new(pitch(weights));
+        let run = bench.run(&["design", FILE, "--json"]);
+        assert_eq!(run.code(), 0, "{}", run.stderr());
+        run.json()["gamma"][0].as_f64().unwrap()
+    };
+    let usual = "output_weight = 0.2\nintegral_weight = 0.5\ninput_weight = 0.1";
+    let bench = Bench::new(pitch(usual));
+    one(
+        &of_design(&bench),
+        &[
+            "controller.output_weight, controller.integral_weight, controller.input_weight have hardly any effect",
+            "controller.input_weight alone decides gamma",
+            "times smaller",
+        ],
+    );
+    // It is true: gamma follows the weight, with the same gains. The warnings of a run do not ask for more of what does nothing.
+    let heavier = gamma("output_weight = 0.2\nintegral_weight = 0.5\ninput_weight = 1.0");
+    assert!((heavier / gamma(usual) - 10.0).abs() < 1e-2);
+    let run = of_run(&bench, &[]);
+    let noisy = run
+        .iter()
+        .find(|warning| warning.contains("noise of the sensors moves elevator"));
+    let noisy = noisy.unwrap_or_else(|| panic!("{run:?}"));
+    assert!(noisy.contains("objective = decay"), "{noisy}");
+    assert!(!noisy.contains("raise controller.input_weight"), "{noisy}");
+    // And what is advised moves the gains.
+    let lighter = gamma("output_weight = 20.0\nintegral_weight = 50.0\ninput_weight = 0.1");
+    assert!(lighter / gamma(usual) > 1.02);
+}
+
+/// A fast Luenberger observer leaves the running loop with a multiple of the gain of a measured state.
+#[test]
+fn an_observer_that_costs_much_is_named() {
+    let unstable = r#"name = "unstable"
+sample_time = 1.0
+[[mode]]
+A = [[1.2]]
+B = [[1.0]]
+C = [[1.0]]
+E = [[1.0]]
+[controller]
+tracked = [1]
+decay = 0.9
+[observer]
+kind = "luenberger"
+decay = 0.6
+[estimator]
+method = "none"
+[scenario]
+steps = 50
+noise = 0.01
+disturbance = [{ kind = "sine", amplitude = 0.01, period = 20 }]
+"#;
+    one(
+        &of_design(&Bench::new(unstable)),
+        &[
+            "mode 1: with this observer gamma_loop is ",
+            "times gamma",
+            "observer.kind = auto",
+        ],
+    );
+    let best = unstable.replace("\"luenberger\"", "\"auto\"");
+    assert_eq!(of_design(&Bench::new(best)), Vec::<String>::new());
+}
+
+/// What bumpless transfer is proved for is said, and no gain is claimed across its switches.
+#[test]
+fn bumpless_transfer_says_how_often() {
+    let report = |lyapunov: &str, bumpless: bool| {
+        let keys = format!("lyapunov = \"{lyapunov}\"\nbumpless = {bumpless}\n");
+        let bench = Bench::new(damaged("lyapunov = \"common\"\n", &keys));
+        let run = bench.run(&["design", FILE, "--json"]);
+        assert_eq!(run.code(), 0, "{}", run.stderr());
+        (run.json(), bench.run(&["design", FILE]).stdout())
+    };
+    let (json, text) = report("common", false);
+    assert!(json["gamma_loop_switching"].is_number() && json["bumpless_samples"].is_null());
+    assert!(!text.contains("bumpless"), "{text}");
+    for lyapunov in ["common", "switched", "dwell"] {
+        let (json, text) = report(lyapunov, true);
+        assert!(json["gamma_loop_switching"].is_null());
+        let samples = json["bumpless_samples"].as_u64().unwrap();
+        let said = match json["bumpless_needs_dwell"].as_bool().unwrap() {
+            true => "proved when each mode lasts at least ".to_owned(),
+            false => format!(
+                "the command is continuous at a switch {samples} samples or more after the last"
+            ),
+        };
+        assert!(text.contains(&said), "{text}");
+        assert!(
+            text.contains("no gain is claimed across a switch"),
+            "{text}"
+        );
+    }
+}

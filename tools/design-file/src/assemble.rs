@@ -39,7 +39,7 @@ pub(crate) fn request(file: &DesignFile, folder: &Path, notes: &Notes) -> Result
     at("name", check::identifier(&file.name))?;
     let given = plant::read(file, folder, notes)?;
     let signals = signals(&file.signals, &given)?;
-    let true_plant = true_plant::true_plant(file, &given, folder)?;
+    let true_plant = true_plant::true_plant(file, &given, &signals, folder, notes)?;
     let plant = given.plant;
     let dims = plant.dimensions();
     let disturbance = disturbance(file, dims)?;
@@ -69,6 +69,7 @@ pub(crate) fn request(file: &DesignFile, folder: &Path, notes: &Notes) -> Result
             most_samples: MOST_STEPS,
             notes,
         },
+        end: true_plant::end(file),
     }
     .resolve()?;
     let usual = Request::new(&file.name, plant, signals, scenario);
@@ -263,7 +264,7 @@ fn control(
     signals: &Signals,
     dims: Dimensions,
 ) -> Result<ControlSpec, String> {
-    let usual = ControlSpec::tracking(tracked(given, dims)?, &signals.scaling());
+    let usual = ControlSpec::tracking(tracked(given, signals, dims)?, &signals.scaling());
     let latency = given.latency.map_or(Ok(usual.latency), |latency| {
         at("controller.latency", check::count(latency, 0, 1))
     })?;
@@ -316,24 +317,31 @@ fn lyapunov(kind: LyapunovKind) -> Lyapunov {
     }
 }
 
-fn tracked(given: &schema::Controller, dims: Dimensions) -> Result<Vec<usize>, String> {
-    let Some(numbers) = &given.tracked else {
+fn tracked(
+    given: &schema::Controller,
+    signals: &Signals,
+    dims: Dimensions,
+) -> Result<Vec<usize>, String> {
+    let Some(given) = &given.tracked else {
         return Ok((0..dims.outputs.min(dims.inputs)).collect());
     };
-    if numbers.is_empty() {
-        return Err("controller.tracked is empty: name at least one output, counted from 1".into());
+    if given.is_empty() {
+        return Err(
+            "controller.tracked is empty: name at least one output, or count it from 1".into(),
+        );
     }
+    let names = names(&signals.outputs);
     let mut tracked = Vec::new();
-    for &number in numbers {
-        let output = check::index("controller.tracked:", number, dims.outputs, "outputs").map_err(
-            |what| {
+    for which in given {
+        let output = which
+            .index("controller.tracked:", &names, "outputs")
+            .map_err(|what| {
                 what.to_string()
-                    .replace(": is", " contains a number that is")
-            },
-        )?;
+                    .replace(": is", " contains an entry that is")
+            })?;
         if tracked.contains(&output) {
             return Err(format!(
-                "controller.tracked names output {number} twice: name each output once"
+                "controller.tracked names output {which} twice: name each output once"
             ));
         }
         tracked.push(output);
@@ -346,6 +354,11 @@ fn tracked(given: &schema::Controller, dims: Dimensions) -> Result<Vec<usize>, S
         ));
     }
     Ok(tracked)
+}
+
+/// What signals are called.
+pub(crate) fn names(signals: &[Signal]) -> Vec<&str> {
+    signals.iter().map(|signal| signal.name.as_str()).collect()
 }
 
 /// The weight of each channel.

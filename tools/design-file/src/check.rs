@@ -43,7 +43,7 @@ pub enum ValueError {
         /// The most allowed.
         most: usize,
     },
-    /// A number of a thing that does not exist. Unlike the others it begins with the key.
+    /// A number of a thing that does not exist. Unlike most others it begins with the key.
     #[error("{key} is {number}: {things} are numbered from 1 to {total}")]
     Index {
         /// The key.
@@ -54,6 +54,36 @@ pub enum ValueError {
         total: usize,
         /// What they are, in the plural.
         things: String,
+    },
+    /// A name of nothing. It begins with the key, too.
+    #[error(
+        "{key} is \"{}\", the name of none of the {things}: {advice}",
+        shorten(name)
+    )]
+    NoSuchName {
+        /// The key.
+        key: String,
+        /// The name.
+        name: String,
+        /// What things are called, in the plural.
+        things: String,
+        /// Which names there are.
+        advice: String,
+    },
+    /// A name of more than one thing. It begins with the key, too.
+    #[error(
+        "{key} is \"{}\", the name of several {things}: give the number, from 1 to {total}",
+        shorten(name)
+    )]
+    SharedName {
+        /// The key.
+        key: String,
+        /// The name.
+        name: String,
+        /// What things are called, in the plural.
+        things: String,
+        /// How many there are.
+        total: usize,
     },
     /// A list with another length than there are channels.
     #[error("has {found} entries: give one number, or a list of {needed}")]

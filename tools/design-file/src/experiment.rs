@@ -1,10 +1,12 @@
 //! The experiment that a design file asks for.
 
-use crate::assemble::{MOST_STEPS, at};
+use crate::assemble::{MOST_STEPS, at, names};
 use crate::check;
 use crate::defaults;
 use crate::schema;
 use crate::signal::{Signal as SignalOverTime, Tables};
+use crate::true_plant::{beyond_the_end, mode_names};
+use crate::values::Which;
 use ftc_design::Signals;
 use ftc_design::assembly::KnownDisturbance;
 use ftc_plant::scenario::{ModeInterval, Waveform};
@@ -19,6 +21,8 @@ pub(crate) struct ScenarioContext<'a> {
     pub(crate) plant: &'a SwitchedPlant,
     pub(crate) dims: Dimensions,
     pub(crate) tables: Tables<'a>,
+    /// When the scenario ends, in seconds.
+    pub(crate) end: f64,
 }
 
 impl ScenarioContext<'_> {
@@ -61,7 +65,10 @@ impl ScenarioContext<'_> {
     }
 
     fn schedule(&self) -> Result<Vec<ModeInterval>, String> {
-        let whole = [schema::ModeInterval { from: 0.0, mode: 1 }];
+        let whole = [schema::ModeInterval {
+            from: 0.0,
+            mode: Which::Number(1),
+        }];
         let given = self.scenario.schedule.as_deref().unwrap_or(&whole);
         if given.first().is_none_or(|interval| interval.from != 0.0) {
             return Err(
@@ -76,10 +83,12 @@ impl ScenarioContext<'_> {
                 pair[0].from, pair[1].from
             ));
         }
-        let total = self.plant.modes.len();
+        let names = mode_names(self.plant);
         let resolve = |(entry, interval): (usize, &schema::ModeInterval)| {
-            let what = format!("scenario.schedule[{}].mode", entry + 1);
-            let mode = check::index(&what, interval.mode, total, "modes")?;
+            let key = format!("scenario.schedule[{}]", entry + 1);
+            let what = format!("{key}.mode");
+            let mode = interval.mode.index(&what, &names, "modes")?;
+            self.warn_beyond_the_end(&key, interval.from);
             Ok(ModeInterval {
                 from: interval.from,
                 mode,
@@ -114,13 +123,23 @@ impl ScenarioContext<'_> {
 
     fn events(&self) -> Result<Vec<ftc_plant::scenario::FaultEvent>, String> {
         let events = self.scenario.events.iter().flatten().enumerate();
+        let names = names(&self.signals.outputs);
         events
             .map(|(index, event)| {
-                event
-                    .fault(self.dims.outputs)
-                    .map_err(|what| format!("scenario.events[{}]: {what}", index + 1))
+                let key = format!("scenario.events[{}]", index + 1);
+                let fault = event.fault(&names);
+                let fault = fault.map_err(|what| format!("{key}: {what}"))?;
+                self.warn_beyond_the_end(&key, fault.from);
+                Ok(fault)
             })
             .collect()
+    }
+
+    /// Says of an entry that begins when the scenario is over that it never acts.
+    fn warn_beyond_the_end(&self, key: &str, from: f64) {
+        if from >= self.end {
+            self.tables.notes.add(beyond_the_end(key, from, self.end));
+        }
     }
 
     /// A step of a tracked output from its operating point in the first mode.

@@ -30,6 +30,7 @@ pub mod check;
 pub mod defaults;
 mod error;
 mod estimator;
+mod event;
 mod experiment;
 mod healthy_log;
 mod notes;

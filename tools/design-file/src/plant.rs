@@ -26,9 +26,9 @@ impl Found {
     pub(crate) fn with_other_matrices(
         &self,
         file: &DesignFile,
-        modes: &[schema::Mode],
-        folder: &Path,
+        others: &Others,
     ) -> Result<SwitchedPlant, String> {
+        let modes = others.modes;
         if modes.len() != self.given.len() {
             return Err(format!(
                 "mode has {} entries: give one for each of the {} modes, empty where nothing differs",
@@ -38,8 +38,11 @@ impl Found {
         }
         let mut given = self.given.clone();
         for (index, (own, other)) in given.iter_mut().zip(modes).enumerate() {
-            let source = Source::of(other, folder).map_err(|what| in_mode(index, &what))?;
+            let source = Source::of(other, others.folder).map_err(|what| in_mode(index, &what))?;
             own.replace(&source).map_err(|what| in_mode(index, &what))?;
+            if others.continuous != is_continuous(file) {
+                complete(&source, own, others.continuous).map_err(|what| in_mode(index, &what))?;
+            }
         }
         let plant = assembled(file, &given)?;
         if sized(&plant)? != sized(&assembled(file, &self.given)?)? {
@@ -47,7 +50,10 @@ impl Found {
                 "the matrices have other sizes than those of the model: keep to them".into(),
             );
         }
-        let found = sampled_and_extended(file, plant, given)?;
+        if !others.continuous && plant.looks_continuous() {
+            others.notes.add(looks_continuous("scenario.plant."));
+        }
+        let found = sampled_and_extended(file, plant, given, others.continuous)?;
         if found.held_inputs != self.held_inputs {
             return Err(
                 "D is that of the true plant alone: give the modes of the model one too".into(),
@@ -55,6 +61,43 @@ impl Found {
         }
         Ok(found.plant)
     }
+}
+
+/// The matrices of a true plant, as the file gives them.
+pub(crate) struct Others<'a> {
+    pub(crate) modes: &'a [schema::Mode],
+    /// Whether they describe `dx/dt`.
+    pub(crate) continuous: bool,
+    pub(crate) folder: &'a Path,
+    pub(crate) notes: &'a Notes,
+}
+
+/// Whether the modes of a file describe `dx/dt`.
+pub(crate) fn is_continuous(file: &DesignFile) -> bool {
+    file.continuous == Some(true)
+}
+
+/// Refuses a mode that leaves to the model what the model says about the other kind of time.
+fn complete(source: &Source, own: &Given, continuous: bool) -> Result<(), String> {
+    let disturbed = own.mode.e.ncols() > 0;
+    for (name, needed) in [("A", true), ("B", true), ("E", disturbed)] {
+        if needed && source.optional(name)?.is_none() {
+            return Err(format!(
+                "{name} is missing: with continuous = {continuous} it cannot be taken from the model, whose matrices are \
+                 not: add it"
+            ));
+        }
+    }
+    Ok(())
+}
+
+/// What is said of a stable continuous-time model that is taken for a discrete one.
+fn looks_continuous(table: &str) -> String {
+    format!(
+        "{table}{}every eigenvalue of A has a negative real part, as in a stable continuous-time model, but A and B are \
+         taken as discrete, x(k+1) = A x(k) + B u(k): set {table}continuous = true if they describe dx/dt",
+        if table.is_empty() { "" } else { "mode: " }
+    )
 }
 
 /// One mode as it stands in the file.
@@ -88,14 +131,10 @@ pub(crate) fn read(file: &DesignFile, folder: &Path, notes: &Notes) -> Result<Fo
     };
     let plant = assembled(file, &modes)?;
     bearable(&plant, sized(&plant)?)?;
-    if file.continuous != Some(true) && plant.looks_continuous() {
-        notes.add(
-            "every eigenvalue of A has a negative real part, as in a stable continuous-time model, but A and B are \
-             taken as discrete, x(k+1) = A x(k) + B u(k): set continuous = true if they describe dx/dt"
-                .into(),
-        );
+    if !is_continuous(file) && plant.looks_continuous() {
+        notes.add(looks_continuous(""));
     }
-    sampled_and_extended(file, plant, modes)
+    sampled_and_extended(file, plant, modes, is_continuous(file))
 }
 
 /// The modes as one plant, as it stands in the file.
@@ -112,8 +151,9 @@ fn sampled_and_extended(
     file: &DesignFile,
     mut plant: SwitchedPlant,
     given: Vec<Given>,
+    continuous: bool,
 ) -> Result<Found, String> {
-    if file.continuous == Some(true) {
+    if continuous {
         sample(&mut plant)?;
     }
     extend(plant, given, file.controller.latency.unwrap_or(0))

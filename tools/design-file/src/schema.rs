@@ -4,8 +4,9 @@
 //! nearest known key is found from these structs. What an absent key means is written down in
 //! [`crate::defaults`]; what a value must satisfy, in [`crate::check`].
 
-use crate::signal::{Event, Signal};
-use crate::values::{Matrix, NameOrList, NumberOrList};
+use crate::event::Event;
+use crate::signal::Signal;
+use crate::values::{Matrix, NameOrList, NumberOrList, Which};
 use ftc_plant::rectifier::Rectifier;
 use serde::Deserialize;
 
@@ -48,10 +49,47 @@ pub struct DesignFile {
 
 /// `[plant]`: what is simulated, and linearised for the design.
 #[derive(Clone, Debug, Deserialize)]
-#[serde(tag = "model", rename_all = "kebab-case")]
+#[serde(from = "PlantTable")]
 pub enum PlantModel {
     /// The averaged three-phase rectifier; one mode per load.
     Rectifier(Rectifier),
+}
+
+/// `[plant]` as it is written: a table with a tag would not say which of its keys is at fault.
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct PlantTable {
+    model: ModelName,
+    inductance: f64,
+    resistance: f64,
+    capacitance: f64,
+    phase_voltage: f64,
+    current_loop: f64,
+    dc_voltage: f64,
+    loads: Vec<f64>,
+}
+
+/// Values of `plant.model`.
+#[derive(Deserialize)]
+#[serde(rename_all = "kebab-case")]
+enum ModelName {
+    Rectifier,
+}
+
+impl From<PlantTable> for PlantModel {
+    fn from(table: PlantTable) -> Self {
+        match table.model {
+            ModelName::Rectifier => Self::Rectifier(Rectifier {
+                inductance: table.inductance,
+                resistance: table.resistance,
+                capacitance: table.capacitance,
+                phase_voltage: table.phase_voltage,
+                current_loop: table.current_loop,
+                dc_voltage: table.dc_voltage,
+                loads: table.loads,
+            }),
+        }
+    }
 }
 
 /// One `[[mode]]`; a matrix is a list of rows, or the name of a variable in `file`.
@@ -145,8 +183,8 @@ pub struct Disturbance {
 #[derive(Clone, Debug, Default, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Controller {
-    /// Numbers of the outputs that follow a reference, from 1.
-    pub tracked: Option<Vec<i64>>,
+    /// The outputs that follow a reference.
+    pub tracked: Option<Vec<Which>>,
     /// Samples between a measurement and the first effect of its command.
     pub latency: Option<i64>,
     /// Which guarantee of stability under switching.
@@ -326,6 +364,8 @@ pub struct TruePlant {
     /// Other matrices, one entry per mode; a matrix that is left out is that of the model.
     #[serde(rename = "mode")]
     pub modes: Option<Vec<Mode>>,
+    /// Whether these describe `dx/dt`; as the whole file, where it is not said.
+    pub continuous: Option<bool>,
     /// Largest relative error of the entries of `A`, `B` and `E`.
     pub relative_error: Option<f64>,
     /// Seed of these errors.
@@ -345,7 +385,7 @@ pub struct TruePlant {
 }
 
 /// Another mode is told for a while.
-#[derive(Clone, Copy, Debug, Deserialize)]
+#[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Told {
     /// Seconds.
@@ -353,20 +393,20 @@ pub struct Told {
     /// Seconds.
     #[serde(default = "crate::signal::endless")]
     pub until: f64,
-    /// Number of the mode, from 1.
-    pub mode: i64,
+    /// The mode.
+    pub mode: Which,
 }
 
 /// A constant added to an input, a disturbance or a state.
-#[derive(Clone, Copy, Debug, Deserialize)]
+#[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Load {
-    /// Number of the input, from 1.
-    pub input: Option<i64>,
-    /// Number of the disturbance, from 1.
-    pub disturbance: Option<i64>,
-    /// Number of the state, from 1.
-    pub state: Option<i64>,
+    /// The input.
+    pub input: Option<Which>,
+    /// The disturbance.
+    pub disturbance: Option<Which>,
+    /// The state.
+    pub state: Option<Which>,
     /// Seconds.
     pub from: f64,
     /// Seconds.
@@ -376,12 +416,12 @@ pub struct Load {
     pub size: f64,
 }
 
-/// A mode (from 1) and the time in seconds from which it is active.
-#[derive(Clone, Copy, Debug, Deserialize)]
+/// A mode and the time in seconds from which it is active.
+#[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct ModeInterval {
     /// Seconds.
     pub from: f64,
-    /// Number of the mode, from 1.
-    pub mode: i64,
+    /// The mode.
+    pub mode: Which,
 }

@@ -90,7 +90,8 @@ fn key(path: &Path) -> String {
     while let Some(segment) = segments.next() {
         match (segment, segments.peek()) {
             (Segment::Map { key }, Some(Segment::Seq { index })) if key == "mode" => {
-                out = format!("mode {}:", index + 1);
+                let table = if out.is_empty() { "" } else { ": " };
+                out = format!("{out}{table}mode {}:", index + 1);
                 segments.next();
             }
             (Segment::Map { key } | Segment::Enum { variant: key }, _) => {
@@ -129,13 +130,23 @@ fn plain_types(message: &str) -> String {
         ("invalid type: sequence", "a list stands here"),
         ("invalid type: ", "this is a "),
         (" as i128", ""),
+        ("expected variant identifier", "expected a text"),
+        ("wanted string or table", "expected a text"),
         ("this is a integer", "this is the integer"),
         ("this is a floating point", "this is the number"),
     ]
     .iter()
-    .fold(message.to_string(), |text, (from, to)| {
+    .fold(without_type_names(message), |text, (from, to)| {
         text.replace(from, to)
     })
+}
+
+/// `expected struct Scenario` and the like name types of this program, which nobody else knows.
+fn without_type_names(message: &str) -> String {
+    match message.split_once("expected struct ") {
+        Some((before, _)) => format!("{before}expected a table"),
+        None => message.to_string(),
+    }
 }
 
 /// The message on one line, of limited length.

@@ -1,7 +1,7 @@
-//! Signals over time, and faults of sensors, as the user writes them.
+//! Signals over time, as the user writes them.
 
 use crate::notes::Notes;
-use ftc_plant::scenario::{FaultEvent, FaultKind, Waveform};
+use ftc_plant::scenario::Waveform;
 use ftc_tables::{Clock, Interpolation, Table, find_time_column, resample};
 use serde::de::value::MapAccessDeserializer;
 use serde::de::{Deserialize, Deserializer, Error, MapAccess, Visitor};
@@ -10,49 +10,58 @@ use std::path::Path;
 
 /// A number, which stays the same for ever, or a table with a `kind`.
 #[derive(Clone, Debug)]
-pub struct Signal(Shape);
+pub struct Signal(Given);
 
-/// The kinds of signal; times are in seconds.
+#[derive(Clone, Debug)]
+enum Given {
+    Number(f64),
+    Table(Box<SignalTable>),
+}
+
+/// A signal as a table; times are in seconds.
 #[derive(Clone, Debug, serde::Deserialize)]
-#[serde(tag = "kind", rename_all = "kebab-case", deny_unknown_fields)]
-enum Shape {
-    Constant {
-        value: f64,
-    },
-    Steps {
-        points: Vec<[f64; 2]>,
-    },
-    Square {
-        amplitude: f64,
-        period: f64,
-        #[serde(default)]
-        offset: f64,
-    },
-    Sine {
-        amplitude: f64,
-        period: f64,
-        #[serde(default)]
-        phase: f64,
-        #[serde(default)]
-        offset: f64,
-    },
-    Ramp {
-        #[serde(default)]
-        value: f64,
-        slope: f64,
-        #[serde(default)]
-        from: f64,
-        #[serde(default = "endless")]
-        until: f64,
-    },
-    Table {
-        file: String,
-        column: String,
-        #[serde(default)]
-        time: Option<String>,
-        #[serde(default)]
-        interpolation: Between,
-    },
+#[serde(deny_unknown_fields)]
+struct SignalTable {
+    kind: Kind,
+    value: Option<f64>,
+    points: Option<Vec<[f64; 2]>>,
+    amplitude: Option<f64>,
+    period: Option<f64>,
+    phase: Option<f64>,
+    offset: Option<f64>,
+    slope: Option<f64>,
+    from: Option<f64>,
+    until: Option<f64>,
+    file: Option<String>,
+    column: Option<String>,
+    time: Option<String>,
+    interpolation: Option<Between>,
+}
+
+/// Values of a signal's `kind`.
+#[derive(Clone, Copy, Debug, serde::Deserialize)]
+#[serde(rename_all = "kebab-case")]
+enum Kind {
+    Constant,
+    Steps,
+    Square,
+    Sine,
+    Ramp,
+    Table,
+}
+
+impl Kind {
+    /// Its name, and the keys that describe it.
+    fn keys(self) -> (&'static str, &'static [&'static str]) {
+        match self {
+            Self::Constant => ("constant", &["value"]),
+            Self::Steps => ("steps", &["points"]),
+            Self::Square => ("square", &["amplitude", "period", "offset"]),
+            Self::Sine => ("sine", &["amplitude", "period", "phase", "offset"]),
+            Self::Ramp => ("ramp", &["value", "slope", "from", "until"]),
+            Self::Table => ("table", &["file", "column", "time", "interpolation"]),
+        }
+    }
 }
 
 /// Values of a table's `interpolation`: what a signal is between two of its rows.
@@ -88,65 +97,6 @@ pub struct Tables<'a> {
     pub notes: &'a Notes,
 }
 
-/// A fault of one sensor during `[from, until)`; sensors count from 1, times are in seconds.
-#[derive(Clone, Debug, serde::Deserialize)]
-#[serde(tag = "kind", rename_all = "kebab-case", deny_unknown_fields)]
-pub enum Event {
-    /// Adds `size`.
-    Bias {
-        #[serde(alias = "input")]
-        sensor: i64,
-        from: f64,
-        #[serde(default = "endless")]
-        until: f64,
-        size: f64,
-    },
-    /// Adds `slope` per second.
-    Drift {
-        #[serde(alias = "input")]
-        sensor: i64,
-        from: f64,
-        #[serde(default = "endless")]
-        until: f64,
-        slope: f64,
-    },
-    /// Loses the fraction `loss` of the reading.
-    GainLoss {
-        #[serde(alias = "input")]
-        sensor: i64,
-        from: f64,
-        #[serde(default = "endless")]
-        until: f64,
-        loss: f64,
-    },
-    /// Keeps the last reading.
-    Stuck {
-        #[serde(alias = "input")]
-        sensor: i64,
-        from: f64,
-        #[serde(default = "endless")]
-        until: f64,
-    },
-    /// Adds `size` during the first half of each `period`.
-    Intermittent {
-        #[serde(alias = "input")]
-        sensor: i64,
-        from: f64,
-        #[serde(default = "endless")]
-        until: f64,
-        size: f64,
-        period: f64,
-    },
-    /// Gives no number.
-    Dropout {
-        #[serde(alias = "input")]
-        sensor: i64,
-        from: f64,
-        #[serde(default = "endless")]
-        until: f64,
-    },
-}
-
 /// An end that never comes.
 pub(crate) fn endless() -> f64 {
     f64::MAX
@@ -161,13 +111,14 @@ impl<'de> Deserialize<'de> for Signal {
                 f.write_str("a number or a table with a kind")
             }
             fn visit_f64<E: Error>(self, value: f64) -> Result<Signal, E> {
-                Ok(Signal(Shape::Constant { value }))
+                Ok(Signal(Given::Number(value)))
             }
             fn visit_i64<E: Error>(self, value: i64) -> Result<Signal, E> {
                 self.visit_f64(value as f64)
             }
             fn visit_map<A: MapAccess<'de>>(self, map: A) -> Result<Signal, A::Error> {
-                Shape::deserialize(MapAccessDeserializer::new(map)).map(Signal)
+                let table = SignalTable::deserialize(MapAccessDeserializer::new(map))?;
+                Ok(Signal(Given::Table(Box::new(table))))
             }
         }
         deserializer.deserialize_any(NumberOrTable)
@@ -180,145 +131,104 @@ impl Signal {
     /// # Errors
     /// One sentence, to be put after the signal's key.
     pub(crate) fn waveform(&self, tables: Tables) -> Result<Waveform, String> {
-        let waveform = match &self.0 {
-            Shape::Constant { value } => Waveform::Constant {
+        match &self.0 {
+            Given::Number(value) => Ok(Waveform::Constant {
                 value: finite("value", *value)?,
-            },
-            Shape::Steps { points } => Waveform::Steps {
-                points: ascending(points)?,
-            },
-            Shape::Square {
-                amplitude,
-                period,
-                offset,
-            } => Waveform::Square {
-                amplitude: finite("amplitude", *amplitude)?,
-                period: positive("period", *period)?,
-                offset: finite("offset", *offset)?,
-            },
-            Shape::Sine {
-                amplitude,
-                period,
-                phase,
-                offset,
-            } => Waveform::Sine {
-                amplitude: finite("amplitude", *amplitude)?,
-                period: positive("period", *period)?,
-                phase: finite("phase", *phase)?,
-                offset: finite("offset", *offset)?,
-            },
-            Shape::Ramp {
-                value,
-                slope,
-                from,
-                until,
-            } => {
-                interval(*from, *until)?;
-                Waveform::Ramp {
-                    value: finite("value", *value)?,
-                    slope: finite("slope", *slope)?,
-                    from: *from,
-                    until: *until,
-                }
+            }),
+            Given::Table(table) => {
+                let (name, keys) = table.kind.keys();
+                only(name, keys, &table.given())?;
+                table.waveform(tables)
             }
-            Shape::Table {
-                file,
-                column,
-                time,
-                interpolation,
-            } => {
-                let path = tables.folder.join(file);
-                let values = tables
-                    .read(&path, column, time.as_deref(), (*interpolation).into())
-                    .map_err(|what| format!("{}: {what}", path.display()))?;
-                Waveform::Table { values }
-            }
-        };
-        Ok(waveform)
+        }
     }
 }
 
-impl Event {
-    /// The event for a plant with `sensors` outputs.
-    ///
-    /// # Errors
-    /// One sentence, to be put after the event's key.
-    pub(crate) fn fault(&self, sensors: usize) -> Result<FaultEvent, String> {
-        self.fault_of("sensor", sensors, "outputs")
+impl SignalTable {
+    /// The keys beside `kind`, and whether they are there.
+    fn given(&self) -> [(&'static str, bool); 13] {
+        [
+            ("value", self.value.is_some()),
+            ("points", self.points.is_some()),
+            ("amplitude", self.amplitude.is_some()),
+            ("period", self.period.is_some()),
+            ("phase", self.phase.is_some()),
+            ("offset", self.offset.is_some()),
+            ("slope", self.slope.is_some()),
+            ("from", self.from.is_some()),
+            ("until", self.until.is_some()),
+            ("file", self.file.is_some()),
+            ("column", self.column.is_some()),
+            ("time", self.time.is_some()),
+            ("interpolation", self.interpolation.is_some()),
+        ]
     }
 
-    /// The event for an actuator of a plant with `inputs` inputs.
-    ///
-    /// # Errors
-    /// One sentence, to be put after the event's key.
-    pub(crate) fn actuator_fault(&self, inputs: usize) -> Result<FaultEvent, String> {
-        self.fault_of("input", inputs, "inputs")
-    }
-
-    fn fault_of(&self, what: &str, count: usize, things: &str) -> Result<FaultEvent, String> {
-        let (sensor, from, until, kind) = match *self {
-            Self::Bias {
-                sensor,
-                from,
-                until,
-                size,
-            } => {
-                let size = finite("size", size)?;
-                (sensor, from, until, FaultKind::Bias { size })
-            }
-            Self::Drift {
-                sensor,
-                from,
-                until,
-                slope,
-            } => {
-                let slope = finite("slope", slope)?;
-                (sensor, from, until, FaultKind::Drift { slope })
-            }
-            Self::GainLoss {
-                sensor,
-                from,
-                until,
-                loss,
-            } => {
-                crate::check::fraction(loss).map_err(|what| format!("loss {what}"))?;
-                (sensor, from, until, FaultKind::GainLoss { loss })
-            }
-            Self::Stuck {
-                sensor,
-                from,
-                until,
-            } => (sensor, from, until, FaultKind::Stuck),
-            Self::Intermittent {
-                sensor,
-                from,
-                until,
-                size,
-                period,
-            } => {
-                let size = finite("size", size)?;
-                let period = positive("period", period)?;
-                (
-                    sensor,
+    fn waveform(&self, tables: Tables) -> Result<Waveform, String> {
+        let needed = |key: &str, value: Option<f64>| finite(key, present(key, value)?);
+        let or_zero = |key: &str, value: Option<f64>| finite(key, value.unwrap_or(0.0));
+        let period = || positive("period", present("period", self.period)?);
+        Ok(match self.kind {
+            Kind::Constant => Waveform::Constant {
+                value: needed("value", self.value)?,
+            },
+            Kind::Steps => Waveform::Steps {
+                points: ascending(present("points", self.points.as_ref())?)?,
+            },
+            Kind::Square => Waveform::Square {
+                amplitude: needed("amplitude", self.amplitude)?,
+                period: period()?,
+                offset: or_zero("offset", self.offset)?,
+            },
+            Kind::Sine => Waveform::Sine {
+                amplitude: needed("amplitude", self.amplitude)?,
+                period: period()?,
+                phase: or_zero("phase", self.phase)?,
+                offset: or_zero("offset", self.offset)?,
+            },
+            Kind::Ramp => {
+                let from = self.from.unwrap_or(0.0);
+                let until = self.until.unwrap_or_else(endless);
+                interval(from, until)?;
+                Waveform::Ramp {
+                    value: or_zero("value", self.value)?,
+                    slope: needed("slope", self.slope)?,
                     from,
                     until,
-                    FaultKind::Intermittent { size, period },
-                )
+                }
             }
-            Self::Dropout {
-                sensor,
-                from,
-                until,
-            } => (sensor, from, until, FaultKind::Dropout),
-        };
-        interval(from, until)?;
-        let sensor = crate::check::index(what, sensor, count, things)?;
-        Ok(FaultEvent {
-            sensor,
-            from,
-            until,
-            kind,
+            Kind::Table => {
+                let path = tables.folder.join(present("file", self.file.as_ref())?);
+                let column = present("column", self.column.as_ref())?;
+                let between = self.interpolation.unwrap_or_default();
+                let values = tables
+                    .read(&path, column, self.time.as_deref(), between.into())
+                    .map_err(|what| format!("{}: {what}", path.display()))?;
+                Waveform::Table { values }
+            }
         })
+    }
+}
+
+/// The value of a key that has to be there.
+pub(crate) fn present<T>(key: &str, value: Option<T>) -> Result<T, String> {
+    value.ok_or_else(|| format!("{key} is missing: add it"))
+}
+
+/// Refuses a key that a kind does not have.
+pub(crate) fn only(kind: &str, known: &[&str], given: &[(&str, bool)]) -> Result<(), String> {
+    let mut strangers = given
+        .iter()
+        .filter(|(key, there)| *there && !known.contains(key));
+    match strangers.next() {
+        None => Ok(()),
+        Some((key, _)) if known.is_empty() => Err(format!(
+            "{key} says nothing about kind = \"{kind}\": leave it out"
+        )),
+        Some((key, _)) => Err(format!(
+            "{key} says nothing about kind = \"{kind}\", which has {}: leave it out, or choose another kind",
+            known.join(", ")
+        )),
     }
 }
 
@@ -328,7 +238,7 @@ pub(crate) fn finite(key: &str, value: f64) -> Result<f64, String> {
         .map_err(|what| format!("{key} {what}"))
 }
 
-fn positive(key: &str, value: f64) -> Result<f64, String> {
+pub(crate) fn positive(key: &str, value: f64) -> Result<f64, String> {
     crate::check::positive(value)
         .map(|()| value)
         .map_err(|what| format!("{key} {what}"))

@@ -1,12 +1,16 @@
 //! `[scenario.plant]`: the plant that is simulated, where it is not the one that was designed for.
 
-use crate::assemble::at;
+use crate::assemble::{at, names};
 use crate::check;
-use crate::plant::Found;
+use crate::defaults;
+use crate::notes::Notes;
+use crate::plant::{Found, Others, is_continuous};
 use crate::schema::{self, DesignFile, PlantModel, TruePlant as Given};
 use crate::signal::{finite, interval};
+use ftc_design::Signals;
 use ftc_plant::deviation::{LONGEST_DELAY, Load, Port, Told};
-use ftc_plant::{Deviation, Dimensions, TruePlant};
+use ftc_plant::{Deviation, SwitchedPlant, TruePlant};
+use std::borrow::Cow;
 use std::path::Path;
 
 /// Seed of relative errors, where none is given.
@@ -20,7 +24,9 @@ const SEED: u64 = 1;
 pub(crate) fn true_plant(
     file: &DesignFile,
     found: &Found,
+    signals: &Signals,
     folder: &Path,
+    notes: &Notes,
 ) -> Result<TruePlant, String> {
     let nominal = match &file.plant {
         None => TruePlant::AsDesigned,
@@ -29,9 +35,28 @@ pub(crate) fn true_plant(
     let Some(given) = &file.scenario.plant else {
         return Ok(nominal);
     };
-    let motion = motion(file, given, found, folder, nominal)?;
-    let deviation = deviation(given, found)?;
+    let motion = motion(file, given, found, folder, notes, nominal)?;
+    let end = end(file);
+    let deviation = deviation(given, found, signals, &|key, from| {
+        if from >= end {
+            notes.add(beyond_the_end(&format!("scenario.plant.{key}"), from, end));
+        }
+    })?;
     Ok(motion.with_deviation(deviation))
+}
+
+/// When the scenario ends, in seconds.
+pub(crate) fn end(file: &DesignFile) -> f64 {
+    let steps = file.scenario.steps.unwrap_or(defaults::STEPS as i64);
+    steps as f64 * file.sample_time
+}
+
+/// What is said of something that begins when the scenario is over.
+pub(crate) fn beyond_the_end(key: &str, from: f64, end: f64) -> String {
+    format!(
+        "{key}: it begins at {from} s, but the scenario ends at {end} s, so it never acts: raise scenario.steps, or let \
+         it begin earlier"
+    )
 }
 
 /// Other matrices, and errors of all of them.
@@ -40,10 +65,17 @@ fn motion(
     given: &Given,
     found: &Found,
     folder: &Path,
+    notes: &Notes,
     nominal: TruePlant,
 ) -> Result<TruePlant, String> {
     let error = given.relative_error.unwrap_or(0.0);
     at("scenario.plant.relative_error", check::fraction(error))?;
+    if given.modes.is_none() && given.continuous.is_some() {
+        return Err(
+            "scenario.plant.continuous is about scenario.plant.mode, which is missing: leave it out"
+                .into(),
+        );
+    }
     if given.modes.is_none() && error == 0.0 {
         return Ok(nominal);
     }
@@ -55,7 +87,15 @@ fn motion(
     let mut plant = match &given.modes {
         None => found.plant.clone(),
         Some(modes) => found
-            .with_other_matrices(file, modes, folder)
+            .with_other_matrices(
+                file,
+                &Others {
+                    modes,
+                    continuous: given.continuous.unwrap_or(is_continuous(file)),
+                    folder,
+                    notes,
+                },
+            )
             .map_err(|what| format!("scenario.plant: {what}"))?,
     };
     if error > 0.0 {
@@ -69,9 +109,13 @@ fn motion(
     Ok(TruePlant::Linear { plant })
 }
 
-fn deviation(given: &Given, found: &Found) -> Result<Deviation, String> {
+fn deviation(
+    given: &Given,
+    found: &Found,
+    signals: &Signals,
+    begins: &dyn Fn(&str, f64),
+) -> Result<Deviation, String> {
     let dims = found.plant.dimensions();
-    let modes = found.plant.modes.len();
     let input_gain = match &given.input_gain {
         None => Vec::new(),
         Some(gains) => {
@@ -86,63 +130,93 @@ fn deviation(given: &Given, found: &Found) -> Result<Deviation, String> {
     let delay = |key: &str, samples: Option<i64>| {
         at(key, check::count(samples.unwrap_or(0), 0, LONGEST_DELAY))
     };
-    let told = each("told", &given.told, |told| {
+    let modes = mode_names(&found.plant);
+    let told = each("told", &given.told, |told, key| {
         interval(told.from, told.until)?;
-        let mode = check::index("mode", told.mode, modes, "modes")?;
+        begins(key, told.from);
         Ok(Told {
             from: told.from,
             until: told.until,
-            mode,
+            mode: told.mode.index("mode", &modes, "modes")?,
         })
     });
-    let own = Dimensions {
-        states: dims.states - found.held_inputs,
-        ..dims
-    };
+    let names = Names::new(found, signals);
     Ok(Deviation {
         input_gain,
         sensor_delay: delay("scenario.plant.sensor_delay", given.sensor_delay)?,
-        loads: each("loads", &given.loads, |load| self::load(load, own))?,
-        actuator_faults: each("actuator", &given.actuator, |fault| {
-            fault.actuator_fault(dims.inputs)
+        loads: each("loads", &given.loads, |load, key| {
+            let found = self::load(load, &names)?;
+            begins(key, found.from);
+            Ok(found)
+        })?,
+        actuator_faults: each("actuator", &given.actuator, |fault, key| {
+            let found = fault.actuator_fault(&names.inputs)?;
+            begins(key, found.from);
+            Ok(found)
         })?,
         mode_delay: delay("scenario.plant.mode_delay", given.mode_delay)? as u64,
         told: told?,
     })
 }
 
+/// What modes are called.
+pub(crate) fn mode_names(plant: &SwitchedPlant) -> Vec<&str> {
+    let modes = plant.modes.iter();
+    modes.map(|mode| mode.name.as_str()).collect()
+}
+
+/// What the places are called on which a load may act.
+struct Names<'a> {
+    inputs: Vec<&'a str>,
+    disturbances: Vec<Cow<'a, str>>,
+    states: Vec<&'a str>,
+}
+
+impl<'a> Names<'a> {
+    fn new(found: &Found, signals: &'a Signals) -> Self {
+        let dims = found.plant.dimensions();
+        let mut states = names(&signals.states);
+        states.truncate(dims.states - found.held_inputs);
+        let named = signals.disturbances.iter();
+        let mut disturbances: Vec<Cow<str>> = named.map(|w| w.name.as_str().into()).collect();
+        let rest = disturbances.len()..dims.disturbances;
+        disturbances.extend(rest.map(|at| Cow::from(format!("w[{}]", at + 1))));
+        Self {
+            inputs: names(&signals.inputs),
+            disturbances,
+            states,
+        }
+    }
+}
+
 /// Resolves the entries of a list, and names the one that is wrong.
 fn each<T, U>(
     key: &str,
     given: &Option<Vec<T>>,
-    resolve: impl Fn(&T) -> Result<U, String>,
+    resolve: impl Fn(&T, &str) -> Result<U, String>,
 ) -> Result<Vec<U>, String> {
     let entries = given.iter().flatten().enumerate();
     entries
         .map(|(index, entry)| {
-            resolve(entry).map_err(|what| format!("scenario.plant.{key}[{}]: {what}", index + 1))
+            let key = format!("{key}[{}]", index + 1);
+            resolve(entry, &key).map_err(|what| format!("scenario.plant.{key}: {what}"))
         })
         .collect()
 }
 
-fn load(given: &schema::Load, dims: Dimensions) -> Result<Load, String> {
+fn load(given: &schema::Load, names: &Names) -> Result<Load, String> {
     interval(given.from, given.until)?;
-    let at = match (given.input, given.disturbance, given.state) {
-        (Some(input), None, None) => {
-            Port::Input(check::index("input", input, dims.inputs, "inputs")?)
+    let disturbances: Vec<&str> = names.disturbances.iter().map(AsRef::as_ref).collect();
+    let at = match (&given.input, &given.disturbance, &given.state) {
+        (Some(which), None, None) => Port::Input(which.index("input", &names.inputs, "inputs")?),
+        (None, Some(which), None) => {
+            Port::Disturbance(which.index("disturbance", &disturbances, "disturbances")?)
         }
-        (None, Some(channel), None) => Port::Disturbance(check::index(
-            "disturbance",
-            channel,
-            dims.disturbances,
-            "disturbances",
-        )?),
-        (None, None, Some(state)) => {
-            Port::State(check::index("state", state, dims.states, "states")?)
-        }
+        (None, None, Some(which)) => Port::State(which.index("state", &names.states, "states")?),
         _ => {
             return Err(
-                "name where it acts: one of input, disturbance and state, with its number".into(),
+                "say where it acts: one of input, disturbance and state, with its number or its name"
+                    .into(),
             );
         }
     };

@@ -1,6 +1,7 @@
 //! Values that may be written in more than one way.
 
-use crate::check::ValueError;
+use crate::check::{self, ValueError};
+use crate::{sentence, suggest};
 use serde::de::{Deserialize, Deserializer, Error, SeqAccess, Visitor};
 use std::fmt;
 
@@ -50,6 +51,73 @@ impl<'de> Deserialize<'de> for NumberOrList {
                     values.push(value);
                 }
                 Ok(NumberOrList::List(values))
+            }
+        }
+        deserializer.deserialize_any(Either)
+    }
+}
+
+/// One of several things, by its number from 1 or by its name.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Which {
+    /// The number.
+    Number(i64),
+    /// The name.
+    Name(String),
+}
+
+impl Which {
+    /// Its index from 0 among things of these names.
+    ///
+    /// # Errors
+    /// A number or name of nothing, or a name of more than one; the sentence begins with `key`, and
+    /// `things` is what they are called.
+    pub fn index(&self, key: &str, names: &[&str], things: &str) -> Result<usize, ValueError> {
+        let name = match self {
+            Self::Number(number) => return check::index(key, *number, names.len(), things),
+            Self::Name(name) => name,
+        };
+        let mut places = (0..names.len()).filter(|&at| names[at] == name);
+        match (places.next(), places.next()) {
+            (Some(at), None) => Ok(at),
+            (Some(_), Some(_)) => Err(ValueError::SharedName {
+                key: key.to_string(),
+                name: name.clone(),
+                things: things.to_string(),
+                total: names.len(),
+            }),
+            (None, _) => Err(ValueError::NoSuchName {
+                key: key.to_string(),
+                name: name.clone(),
+                things: things.to_string(),
+                advice: suggest::nearest(name, names),
+            }),
+        }
+    }
+}
+
+impl fmt::Display for Which {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Number(number) => write!(f, "{number}"),
+            Self::Name(name) => write!(f, "\"{}\"", sentence::shorten(name)),
+        }
+    }
+}
+
+impl<'de> Deserialize<'de> for Which {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        struct Either;
+        impl Visitor<'_> for Either {
+            type Value = Which;
+            fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+                f.write_str("a whole number, counted from 1, or a name")
+            }
+            fn visit_i64<E: Error>(self, number: i64) -> Result<Which, E> {
+                Ok(Which::Number(number))
+            }
+            fn visit_str<E: Error>(self, name: &str) -> Result<Which, E> {
+                Ok(Which::Name(name.to_string()))
             }
         }
         deserializer.deserialize_any(Either)

@@ -7,9 +7,11 @@ use crate::export::{HOST, KINDS, Kind, RESOURCE};
 use crate::platform::PLATFORMS;
 use crate::reading;
 use crate::signature::{self, Origin, VerifyingKey};
+use ftc_design::running_loop::TransferCertificate;
 use ftc_design::{Design, DwellTime, LostSensors, Lyapunov, Proof};
 use quick_xml::escape::unescape;
 use quick_xml::events::Event;
+use report::running_loop;
 use serde_json::{Value, json};
 use std::collections::BTreeMap;
 use std::fmt;
@@ -296,6 +298,10 @@ impl fmt::Display for Verification {
             );
             line(&format!("loop, mode {} ({})", index + 1, mode.name), text)?;
         }
+        line("loop, stability", running_loop::stability(&self.proof))?;
+        if let Some(proved) = &running.transfer {
+            line("bumpless transfer", running_loop::bumpless(proved))?;
+        }
         line(
             "loop, switching",
             match (&running.switching, modes.len()) {
@@ -306,7 +312,7 @@ impl fmt::Display for Verification {
                     )
                 }
                 (None, 1) => "there is one mode".into(),
-                (None, _) => "stable as above; no gain is claimed across a switch".into(),
+                (None, _) => "no gain is claimed across a switch".into(),
             },
         )?;
         for entry in &running.lost {
@@ -368,6 +374,9 @@ impl Verification {
             "gamma": self.proof.state_feedback.gamma,
             "gamma_loop": running.gamma_loop,
             "gamma_loop_switching": running.switching.as_ref().map(|s| s.gamma),
+            "stability": running_loop::stability(&self.proof),
+            "bumpless_samples": running.transfer.as_ref().map(TransferCertificate::samples),
+            "bumpless_needs_dwell": running.transfer.as_ref().map(TransferCertificate::needs_dwell),
             "noise_gain": running.noise_gain,
             "fault_gain": running.fault_gain,
             "lost_sensors": running.lost,

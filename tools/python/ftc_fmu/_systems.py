@@ -103,9 +103,11 @@ def _checked(model: Matrices) -> Matrices:
     for name, wanted in (("A", (n, n)), ("B", (n, m)), ("C", (p, n)), ("D", (p, m))):
         matrix = getattr(model, name)
         if matrix.shape != wanted:
+            # What B and C should be besides is told by themselves, so a transposed one tells it wrongly.
+            turned = {"B": matrix.shape[1] == n, "C": matrix.shape[0] == n, "D": matrix.T.shape == wanted}.get(name)
+            hint = "it seems to be transposed" if turned else f"it must be {wanted[0]} x {wanted[1]}"
             raise DesignFileError(
-                f"{model.where}: {name} is {matrix.shape[0]} x {matrix.shape[1]}: "
-                f"beside the other matrices it must be {wanted[0]} x {wanted[1]}",
+                f"{model.where}: {name} is {matrix.shape[0]} x {matrix.shape[1]}: beside the other matrices {hint}",
                 name,
             )
         if not np.isfinite(matrix).all():

@@ -86,8 +86,9 @@ class Design:
         Args:
             scenario: `[scenario]` of a design file in place of the design's own: `steps`, `noise`,
                 `seed`, `schedule`, `reference` (r signals), `fault` (p signals), `events`,
-                `disturbance` (s signals); a signal is a number or a table with a `kind`. The
-                controller stays as it is.
+                `disturbance` (s signals); a signal is a number or a table with a `kind`. `plant` is the
+                true plant: a table, or a `Plant` at the design's sample time. The controller stays as
+                it is.
             baselines: Run also the paper's additive control and model predictive control.
 
         Returns:
@@ -98,7 +99,8 @@ class Design:
         """
         text = None
         if scenario is not None:
-            text = to_toml(self.document | {"scenario": plain(dict(scenario), "scenario")})
+            told = _scenario(scenario, self.sample_time)
+            text = to_toml(self.document | {"scenario": plain(told, "scenario")})
         return Run(self.core.simulate(text, str(self._folder), baselines))
 
     def export(
@@ -181,6 +183,8 @@ def design(plant: Plant, *, name: str = "design", progress: Progress = None, **k
     control = dict(keys.pop("controller", {})) | keys
     if "tracked" in control:
         control["tracked"] = _tracked(control["tracked"], plant)
+    if tables.get("scenario") is not None:
+        tables["scenario"] = _scenario(tables["scenario"], plant.sample_time)
     folder, tables = _with_logs(tables)
     if control:
         document["controller"] = plain(control, "controller")
@@ -215,6 +219,21 @@ def listener(progress: Progress) -> Callable[[str, float], None] | None:
     if progress is True:
         return lambda what, seconds: print(f"{what} ({seconds:.0f} s)", flush=True)
     return progress or None
+
+
+def _scenario(given: Mapping[str, Any], sample_time: float) -> dict[str, Any]:
+    """A scenario whose true plant is a table, also where it was given as a `Plant`."""
+    scenario = dict(given)
+    truth = scenario.get("plant")
+    if not hasattr(truth, "truth"):
+        return scenario
+    if truth.sample_time != sample_time:
+        raise DesignFileError(
+            f"scenario.plant has a sample time of {truth.sample_time} s, the design one of {sample_time} s: "
+            "give it at the design's",
+            "scenario.plant",
+        )
+    return scenario | {"plant": truth.truth()}
 
 
 def _tracked(given: Sequence[int | str], plant: Plant) -> list[int]:

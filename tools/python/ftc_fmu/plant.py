@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -85,7 +85,8 @@ class Plant:
             nobody commands: they become E and F.
         continuous: Whether arrays `(A, B, C, D)` are of a continuous model; models that know it
             themselves need no word.
-        inputs: Per command its name, or a table `{"name", "unit", "nominal", "min", "max"}`.
+        inputs: Per command its name, or a table `{"name", "unit", "nominal", "min", "max"}`; or the same
+            per column of B, disturbances included, which names them, too.
         outputs: The same per output.
         states: The same per state.
         operating_points: Per mode the steady state `{"x": (n), "u": (m), "y": (p)}` about which it
@@ -126,6 +127,9 @@ class Plant:
             if len(values) != len(given):
                 raise DesignFileError(f"{key} has {len(values)} entries: give {len(given)}, one per mode", key)
         self._disturbance_inputs = list(disturbance_inputs)
+        columns = _names(inputs, given[0].B.shape[1])
+        if columns is not None:
+            given = [replace(model, inputs=columns) for model in given]
         self.modes: list[Mode] = [self._mode(*parts) for parts in zip(given, names, points, strict=True)]
         said = {"inputs": inputs, "outputs": outputs, "states": states}
         self.signals: dict[str, list[dict[str, Any]]] = self._signals(given[0], said)
@@ -179,20 +183,31 @@ class Plant:
     def _signals(self, first: Matrices, said: Mapping[str, Any]) -> dict[str, list[dict[str, Any]]]:
         """The tables of `[signals]`: what was said, else the names that the first model has."""
         disturbed = self._disturbed(first)
-        labels = {
-            "inputs": first.inputs and [name for column, name in enumerate(first.inputs) if column not in disturbed],
-            "outputs": first.outputs,
-            "states": first.states,
+        columns = said["inputs"]
+        if _names(columns, first.B.shape[1]) is None:
+            columns = first.inputs
+        split = {
+            "inputs": columns and [entry for column, entry in enumerate(columns) if column not in disturbed],
+            "disturbances": columns and [columns[column] for column in disturbed],
         }
+        if columns is said["inputs"]:
+            said = {**said, "inputs": None}
+        labels = split | {"outputs": first.outputs, "states": first.states}
         tables = {}
         for key, label in labels.items():
-            entries = said[key] if said[key] is not None else label
+            entries = said[key] if said.get(key) is not None else label
             if entries:
                 tables[key] = [
                     {"name": entry} if isinstance(entry, str) else plain(dict(entry), f"signals.{key}")
                     for entry in entries
                 ]
         return tables
+
+    def truth(self) -> dict[str, Any]:
+        """Returns the plant as `[scenario.plant]`: what is simulated in place of the model."""
+        keys = "ABCDEF"
+        tables = [{key: value for key, value in mode.table().items() if key in keys} for mode in self.modes]
+        return {"continuous": False, "mode": [plain(table, "scenario.plant.mode") for table in tables]}
 
     def document(self) -> dict[str, Any]:
         """Returns the plant as the keys of a design file: `sample_time`, `mode`, `signals`."""
@@ -226,6 +241,13 @@ class Plant:
         from ftc_fmu.identification import identify  # noqa: PLC0415  (that module needs this one)
 
         return identify(logs, order, disturbance)
+
+
+def _names(inputs: Sequence[str | Mapping[str, Any]] | None, width: int) -> list[str] | None:
+    """Names of all columns of B, where there is an entry for each."""
+    if inputs is None or len(inputs) != width:
+        return None
+    return [entry if isinstance(entry, str) else str(entry.get("name", "")) for entry in inputs]
 
 
 def _operating_point(point: Mapping[str, Any]) -> OperatingPoint:

@@ -15,11 +15,17 @@ use std::sync::atomic::Ordering;
 ///
 /// # Errors
 /// One sentence that names the option.
-pub fn options(py: Python<'_>, text: &str) -> PyResult<Options> {
+pub fn options(py: Python<'_>, text: &str, design: &ftc_design::Design) -> PyResult<Options> {
     let options: Options = serde_json::from_str(text)
         .map_err(|error| errors::of_sentence(py, format!("campaign: {error}")))?;
+    // A key that is left out has a default; one that is there is meant.
+    let said = text.contains("\"model_error\"");
     options
         .check()
+        .and_then(|()| match said {
+            true => options.check_model_error(design),
+            false => Ok(()),
+        })
         .map_err(|what| errors::of_sentence(py, what))?;
     Ok(options)
 }

@@ -6,7 +6,7 @@ use crate::errors::{self, Author};
 use crate::run::Run;
 use crate::waiting::wait;
 use ftc_design::DesignError;
-use ftc_design::assembly::{Request, assemble};
+use ftc_design::assembly::assemble;
 use ftc_design::warnings::LoggedMovement;
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
@@ -112,14 +112,17 @@ impl Design {
         baselines: bool,
     ) -> PyResult<Run> {
         let mut design = self.0.design.clone();
+        let mut warnings = self.0.warnings.clone();
         if let Some(text) = text {
-            let request = requested(py, text, &folder)?;
-            design.scenario = request.scenario;
-            design.true_plant = request.true_plant;
+            let loaded = loaded(py, text, &folder)?;
+            design.scenario = loaded.request.scenario;
+            design.true_plant = loaded.request.true_plant;
+            let new = loaded.notes.into_iter();
+            let new: Vec<String> = new.filter(|note| !warnings.contains(note)).collect();
+            warnings.extend(new);
         }
-        let made = self.0.clone();
         let simulated = wait(py, &|| "simulating".into(), None, move || {
-            Run::of(&design, made.warnings.clone(), baselines)
+            Run::of(&design, warnings, baselines)
         })?;
         simulated.map_err(|what| errors::of_sentence(py, what))
     }
@@ -161,7 +164,7 @@ impl Design {
         threads: Option<usize>,
         listener: Option<Py<PyAny>>,
     ) -> PyResult<Bound<'py, PyBytes>> {
-        let options = campaigns::options(py, options)?;
+        let options = campaigns::options(py, options, &self.0.design)?;
         let watched = (threads, listener.as_ref());
         let part = campaigns::run(py, self.0.clone(), options, first..last, watched)?;
         Ok(PyBytes::new(py, &part))
@@ -179,8 +182,6 @@ impl Design {
     }
 }
 
-fn requested(py: Python<'_>, text: &str, folder: &Path) -> PyResult<Request> {
-    design_file::parse(text, folder)
-        .map(|loaded| loaded.request)
-        .map_err(|error| errors::of_input(py, error, Author::Package))
+fn loaded(py: Python<'_>, text: &str, folder: &Path) -> PyResult<design_file::Loaded> {
+    design_file::parse(text, folder).map_err(|error| errors::of_input(py, error, Author::Package))
 }

@@ -64,6 +64,7 @@ def test_names_of_the_model_are_kept() -> None:
         "inputs": [{"name": "valve"}],
         "outputs": [{"name": "speed"}],
         "states": [{"name": "speed"}, {"name": "torque"}],
+        "disturbances": [{"name": "wind"}],
     }
     assert plant.modes[1].E.shape == (2, 1)
 
@@ -72,6 +73,7 @@ def test_names_of_the_model_are_kept() -> None:
     ("arguments", "key", "says"),
     [
         (((A, B, [[1.0]], D), 0.5), "C", "C is 1 x 1: beside the other matrices it must be 1 x 2"),
+        (((A, np.ones((3, 2)), C), 0.5), "B", "B is 3 x 2: beside the other matrices it seems to be transposed"),
         (((A, B, C, D, 0.25), 0.5), "sample_time", "0.25 s"),
         (((A, B, C, D), -1.0), "sample_time", "positive"),
         (((A, [[0.0], [np.nan]], C), 0.5), "B", "no finite number"),
@@ -92,3 +94,16 @@ def test_disturbances_that_are_not_there_are_refused() -> None:
         ftc.Plant((A, B, C, D, 0), 0.5, disturbance_inputs=[2])
     with pytest.raises(ftc.DesignFileError, match='no input "wind"'):
         ftc.Plant((A, B, C, D, 0), 0.5, disturbance_inputs=["wind"])
+
+
+def test_a_disturbance_of_plain_arrays_has_a_name() -> None:
+    """Where `inputs` names every column, commands and disturbances are told apart by name or number."""
+    named = {"inputs": ["valve", {"name": "wind", "unit": "m/s"}], "disturbance_inputs": ["wind"]}
+    plant = ftc.Plant((A, B, C, D, 0), 0.5, **named)
+    assert plant.signals["inputs"] == [{"name": "valve"}]
+    assert plant.signals["disturbances"] == [{"name": "wind", "unit": "m/s"}]
+    counted = ftc.Plant((A, B, C, D, 0), 0.5, inputs=["valve"], disturbance_inputs=[1])
+    np.testing.assert_array_equal(plant.modes[0].E, counted.modes[0].E)
+    np.testing.assert_array_equal(plant.modes[0].B, counted.modes[0].B)
+    with pytest.raises(ftc.DesignFileError, match=r'no input "wand" .valve, wind.'):
+        ftc.Plant((A, B, C, D, 0), 0.5, inputs=["valve", "wind"], disturbance_inputs=["wand"])

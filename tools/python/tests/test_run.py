@@ -14,12 +14,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pytest
 
+import ftc_fmu as ftc
 from conftest import EXAMPLES
 
 if TYPE_CHECKING:
     from pathlib import Path
-
-    import ftc_fmu as ftc
 
 
 @pytest.fixture(scope="module")
@@ -94,3 +93,29 @@ def test_page(run: ftc.Run) -> None:
     """The report in a notebook."""
     assert "<svg" in run._repr_html_()
     assert "told_the_fault" in str(run)
+
+
+def test_the_true_plant_may_be_a_plant(tanks: ftc.Plant) -> None:
+    """The same as its matrices, also where the design's file is continuous; another sample time is refused."""
+    design = ftc.design(tanks, decay=0.9, scenario={"noise": 0.01, "steps": 60})
+    faster = ftc.Plant(
+        [(1.1 * mode.A, 0.9 * mode.B, mode.C) for mode in tanks.modes], sample_time=2.0, names=["closed", "open"]
+    )
+    tables = [{"A": (1.1 * mode.A).tolist(), "B": (0.9 * mode.B).tolist()} for mode in tanks.modes]
+    scenario = {"noise": 0.01, "steps": 60}
+    runs = [design.simulate(scenario | {"plant": plant}) for plant in (faster, {"mode": tables}, {})]
+    found = [run["ftc.y_true"] for run in runs]
+    np.testing.assert_array_equal(found[0], found[1])
+    assert not np.array_equal(found[0], found[2])
+    slow = ftc.Plant([(mode.A, mode.B, mode.C) for mode in tanks.modes], sample_time=4.0)
+    with pytest.raises(ftc.DesignFileError, match=r"sample time of 4.0 s, the design one of 2.0 s"):
+        design.simulate(scenario | {"plant": slow})
+
+
+def test_what_happens_too_late_is_said(tanks: ftc.Plant) -> None:
+    """A run's own warnings are those of its own scenario."""
+    design = ftc.design(tanks, decay=0.9, scenario={"noise": 0.01, "steps": 60})
+    late = {"kind": "bias", "sensor": "level 2", "from": 500.0, "size": 1.0}
+    run = design.simulate({"noise": 0.01, "steps": 60, "events": [late]})
+    assert any("scenario.events[1]: it begins at 500 s" in warning for warning in run.warnings)
+    assert not any("scenario.events" in warning for warning in design.warnings)

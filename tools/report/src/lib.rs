@@ -18,7 +18,7 @@ pub mod documentation;
 pub mod figure;
 pub mod page;
 pub mod robustness;
-mod running_loop;
+pub mod running_loop;
 pub mod simulate;
 pub mod style;
 pub mod summary;

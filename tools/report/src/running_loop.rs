@@ -1,5 +1,7 @@
 //! What is proved of the loop that runs, in words and as JSON.
 
+use crate::text::count;
+use ftc_design::running_loop::{TRANSFER_DECAY, TransferCertificate};
 use ftc_design::{Design, LostSensors, Lyapunov, Proof, Signal};
 use serde_json::{Value, json};
 
@@ -10,6 +12,9 @@ pub fn gains(design: &Design, proof: &Proof) -> Lines {
     let running = &proof.running_loop;
     let inputs = &design.signals.inputs;
     let mut lines = vec![("stability".to_owned(), stability(proof))];
+    if let Some(proved) = &running.transfer {
+        lines.push(("bumpless transfer".to_owned(), bumpless(proved)));
+    }
     for mode in 0..running.noise_gain.len() {
         let gamma = match &running.gamma_loop {
             Some(gamma) => format!("gamma_loop {}", short(gamma[mode])),
@@ -39,8 +44,24 @@ pub fn gains(design: &Design, proof: &Proof) -> Lines {
     lines
 }
 
+/// What bumpless transfer does, and how often.
+pub fn bumpless(proved: &TransferCertificate) -> String {
+    let samples = proved.samples();
+    match proved.needs_dwell() {
+        true => "the command is continuous at every switch, where each mode lasts as long as above"
+            .into(),
+        false => format!(
+            "the command is continuous at a switch {} or more after the last such one; at others it may jump",
+            count(samples, "sample")
+        ),
+    }
+}
+
 /// Under which switching the running loop is proved stable.
 pub fn stability(proof: &Proof) -> String {
+    if let Some(transfer) = &proof.running_loop.transfer {
+        return with_transfer(proof, transfer);
+    }
     let dwell = [proof.state_feedback.dwell, proof.observer.dwell];
     let longest = dwell
         .iter()
@@ -56,6 +77,32 @@ pub fn stability(proof: &Proof) -> String {
             "proved when modes last on average longer than {samples:.2} samples, any decay slower than {decay} per sample within a mode"
         ),
     }
+}
+
+/// The same with bumpless transfer, whose proof has a rate within a mode only.
+fn with_transfer(proof: &Proof, transfer: &TransferCertificate) -> String {
+    let decay = proof.state_feedback.decay.max(proof.observer.spec.decay);
+    let within = format!(
+        "any decay slower than {} per sample within a mode",
+        decay.max(TRANSFER_DECAY)
+    );
+    match transfer.needs_dwell() {
+        true => format!(
+            "proved when each mode lasts at least {}, {within}",
+            count(shortest_mode(proof, transfer), "sample")
+        ),
+        false => format!("proved under arbitrary switching with bumpless transfer, {within}"),
+    }
+}
+
+/// Samples that each mode must last for: as bumpless transfer needs, and longer than the proofs of feedback
+/// and observer need.
+fn shortest_mode(proof: &Proof, transfer: &TransferCertificate) -> usize {
+    let dwell = [proof.state_feedback.dwell, proof.observer.dwell];
+    let longest = dwell.iter().flatten().map(|dwell| dwell.samples);
+    let longest = longest.fold(0.0, f64::max);
+    // The cast saturates.
+    transfer.samples().max(longest.floor() as usize + 1)
 }
 
 /// The sentence an engineer wants first: "Survives the loss of level 1; survives both by the model
@@ -160,6 +207,16 @@ fn changes(design: &Design, proof: &Proof) -> String {
         .lost
         .as_ref()
         .is_some_and(|lost| lost.lyapunov.iter().any(|list| list.len() > 1));
+    if proof.running_loop.transfer.is_some() {
+        return match dwell {
+            0 => "proved when the set changes at any sample while a mode lasts; a bumpless switch is proved with all sensors"
+                .into(),
+            samples => format!(
+                "proved when a set lasts for at least {samples} samples while a mode lasts; a bumpless switch is proved \
+                 with all sensors"
+            ),
+        };
+    }
     match (dwell, by_mode) {
         (0, _) if proof.observer.spec.lyapunov == Lyapunov::Dwell => {
             "proved when the set changes at any sample, and the modes last as above".into()

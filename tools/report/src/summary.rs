@@ -5,6 +5,7 @@ use crate::text::{count, number};
 use crate::warnings;
 use ftc_control::parameters::{Compensation, EstimatorMethod, Hypotheses, ObserverKind};
 use ftc_design::augmented::assumes_input_disturbance;
+use ftc_design::running_loop::TransferCertificate;
 use ftc_design::{
     ControlProof, ControlSpec, Design, DesignError, Failure, ObserverProof, Signal, StateFeedback,
 };
@@ -308,6 +309,8 @@ pub fn json(design: &Design, warnings: &[String]) -> String {
         "gamma": control.and_then(|c| c.gamma.clone()),
         "gamma_loop": running.and_then(|r| r.gamma_loop.clone()),
         "gamma_loop_switching": running.and_then(|r| r.switching.as_ref().map(|s| s.gamma)),
+        "bumpless_samples": running.and_then(|r| r.transfer.as_ref().map(TransferCertificate::samples)),
+        "bumpless_needs_dwell": running.and_then(|r| r.transfer.as_ref().map(TransferCertificate::needs_dwell)),
         "noise_gain": running.map(|r| r.noise_gain.clone()),
         "fault_gain": running.map(|r| r.fault_gain.clone()),
         "command_noise": running.map(|r| r.command_noise.clone()),

@@ -1,11 +1,13 @@
 //! The warnings of a design and of its runs, one sentence each.
 
 use crate::text::number;
-use design_file::schema::DesignFile;
+use design_file::schema::{DesignFile, ObserverKind};
 use design_file::sentence::shorten;
 use ftc_design::state_feedback::REJECTION;
 use ftc_design::warnings::{Doubt, Guess, LoggedMovement, Warning};
-use ftc_design::{Design, Objective, Signal};
+use ftc_design::weights::{Weight, WeightShares};
+use ftc_design::{Design, Objective};
+use ftc_plant::deviation::Destabilised;
 use ftc_simulate::Trajectory;
 use ftc_simulate::warnings::RunWarning;
 use std::fmt::Write;
@@ -25,18 +27,33 @@ pub fn of_design(
     unknown.into_iter().chain(idle).chain(sentences).collect()
 }
 
-/// Weights that were given and shape nothing.
-fn idle_weights(file: &DesignFile, design: &Design) -> Option<String> {
+/// The key of a weight.
+fn key(weight: Weight) -> &'static str {
+    match weight {
+        Weight::Output => "output_weight",
+        Weight::Integral => "integral_weight",
+        _ => "input_weight",
+    }
+}
+
+/// Weights that were given.
+fn given_weights(file: &DesignFile) -> Vec<Weight> {
     let asked = &file.controller;
     let given = [
-        ("output_weight", asked.output_weight.is_some()),
-        ("integral_weight", asked.integral_weight.is_some()),
-        ("input_weight", asked.input_weight.is_some()),
+        (Weight::Output, asked.output_weight.is_some()),
+        (Weight::Integral, asked.integral_weight.is_some()),
+        (Weight::Input, asked.input_weight.is_some()),
     ];
+    let given = given.iter().filter(|(_, given)| *given);
+    given.map(|(weight, _)| *weight).collect()
+}
+
+/// Weights that were given and shape nothing.
+fn idle_weights(file: &DesignFile, design: &Design) -> Option<String> {
+    let given = given_weights(file);
     let names: Vec<String> = given
         .iter()
-        .filter(|(_, given)| *given)
-        .map(|(name, _)| format!("controller.{name}"))
+        .map(|weight| format!("controller.{}", key(*weight)))
         .collect();
     let control = &design.proof.as_ref()?.state_feedback;
     let reason = match (&control.gamma, control.objective) {
@@ -50,10 +67,61 @@ fn idle_weights(file: &DesignFile, design: &Design) -> Option<String> {
             let units = &control.certificate.units;
             let rejection = REJECTION * units.performance / units.disturbance;
             let rejected = gamma.iter().all(|&gamma| gamma <= rejection);
-            rejected.then_some("the disturbance can be rejected completely, whatever they are")?
+            if !rejected {
+                return weak_weights(&given, design);
+            }
+            "the disturbance can be rejected completely, whatever they are"
         }
     };
     (!names.is_empty()).then(|| format!("{} have no effect: {reason}", names.join(", ")))
+}
+
+/// What each weight contributes to the performance signal.
+fn shares(design: &Design) -> Option<WeightShares> {
+    let control = design.synthesis()?.state_feedback;
+    (control.spec.objective == Objective::Attenuation).then_some(())?;
+    WeightShares::of(&design.plant, &control)
+}
+
+/// Weights that were given and shape the gains hardly, with what lets them act.
+fn weak_weights(given: &[Weight], design: &Design) -> Option<String> {
+    let shares = shares(design)?;
+    let alone = shares.alone();
+    let weak: Vec<Weight> = given
+        .iter()
+        .copied()
+        .filter(|&weight| alone.is_some() || shares.is_idle(weight))
+        .collect();
+    if weak.is_empty() {
+        return None;
+    }
+    let names: Vec<String> = weak
+        .iter()
+        .map(|weight| format!("controller.{}", key(*weight)))
+        .collect();
+    let have = if weak.len() == 1 { "has" } else { "have" };
+    let times = |share: f64| number((0.5 / share.max(1e-12)).ceil());
+    let reason = match alone {
+        Some(weight) => format!(
+            "controller.{} alone decides gamma, and only the weights' ratios shape the gains: make it {} times \
+             smaller, or the others larger",
+            key(weight),
+            times(shares.largest_idle())
+        ),
+        None => {
+            let largest = weak.iter().map(|&weight| shares.share(weight));
+            let largest = largest.fold(0.0, f64::max);
+            format!(
+                "at most {:.1} % of the performance signal comes from there: a weight {} times larger would act",
+                100.0 * largest,
+                times(largest)
+            )
+        }
+    };
+    Some(format!(
+        "{} {have} hardly any effect on the state feedback: {reason}",
+        names.join(", ")
+    ))
 }
 
 const UNKNOWN_NOISE: &str = "neither scenario.noise nor estimator.threshold is given: a residual of a thousandth of an \
@@ -62,10 +130,10 @@ const UNKNOWN_NOISE: &str = "neither scenario.noise nor estimator.threshold is g
 /// Of the runs of a design.
 pub fn of_runs(design: &Design, runs: &[Trajectory]) -> Vec<String> {
     let warnings = ftc_simulate::warnings::of_runs(design, runs);
-    let inputs = &design.signals.inputs;
+    let calmer = calmer(design);
     warnings
         .iter()
-        .map(|warning| of_run(inputs, warning))
+        .map(|warning| of_run(design, calmer, warning))
         .collect()
 }
 
@@ -92,6 +160,23 @@ fn of_warning(file: &DesignFile, design: &Design, warning: &Warning) -> String {
             "scenario.schedule: modes last {mean:.2} samples on average, but stability is proved only where they \
              last longer than {needed:.2}: let them last longer"
         ),
+        Warning::CostlyObserver {
+            mode,
+            running,
+            times,
+        } => {
+            let remedy = match file.observer.kind {
+                Some(ObserverKind::Auto) | None => {
+                    "ask for a slower observer.decay, or measure more"
+                }
+                _ => "observer.kind = auto looks for one that serves the loop better",
+            };
+            format!(
+                "mode {}: with this observer gamma_loop is {running:.4}, {times:.1} times gamma with the state known: \
+                 {remedy}",
+                mode + 1
+            )
+        }
         Warning::OutsideTheDatabase {
             mode,
             input,
@@ -146,7 +231,21 @@ fn of_doubt(doubt: &Doubt) -> String {
     }
 }
 
-fn of_run(inputs: &[Signal], warning: &RunWarning) -> String {
+/// What makes the command smaller.
+fn calmer(design: &Design) -> &'static str {
+    let alone = shares(design).and_then(|shares| shares.alone());
+    let control = design.proof.as_ref().map(|proof| &proof.state_feedback);
+    match (control.map(|control| control.objective), alone) {
+        (Some(Objective::Decay), _) => "ask for a slower decay",
+        (_, Some(Weight::Input)) => {
+            "try controller.objective = decay (input_weight alone decides gamma: a larger one hardly changes the state feedback)"
+        }
+        _ => "raise controller.input_weight, ask for a slower decay",
+    }
+}
+
+fn of_run(design: &Design, calmer: &str, warning: &RunWarning) -> String {
+    let inputs = &design.signals.inputs;
     let percent = |share: f64| format!("{:.1} % of the samples", 100.0 * share);
     match *warning {
         RunWarning::Unjudged {
@@ -164,16 +263,27 @@ fn of_run(inputs: &[Signal], warning: &RunWarning) -> String {
             number(widening.round())
         ),
         RunWarning::Saturated { input, share } => format!(
-            "ftc: {} is at a limit in {}, and what is proved holds only while no input is: raise \
-             controller.input_weight, ask for a slower decay, or widen its min and max",
+            "ftc: {} is at a limit in {}, and what is proved holds only while no input is: {calmer}, \
+             or widen its min and max",
             inputs[input].name,
             percent(share)
         ),
         RunWarning::NoisyCommand { input, deviation } => format!(
-            "ftc: the noise of the sensors moves {} by {} (standard deviation), more than a tenth of its range: raise \
-             controller.input_weight, or ask for slower decays",
+            "ftc: the noise of the sensors moves {} by {} (standard deviation), more than a tenth of its range: \
+             {calmer}, or a slower observer.decay",
             inputs[input].name,
             number(deviation)
+        ),
+        RunWarning::UnstablePlant(Destabilised {
+            mode,
+            radius,
+            model,
+        }) => format!(
+            "the true plant is unstable in mode {} ({}): the spectral radius of its A is {radius:.4}, that of the \
+             model's {model:.4}; errors of the entries of a sampled A can do that: lower them, or give the true \
+             plant's matrices themselves",
+            mode + 1,
+            design.plant.modes[mode].name
         ),
         RunWarning::Stopped { variant, time } => format!(
             "{}: the plant's equations cannot be integrated beyond {time} s: the figures end there",

@@ -8,6 +8,7 @@ mod error;
 pub mod matrices;
 mod regular;
 mod resample;
+mod silent;
 mod table;
 mod time;
 

@@ -6,11 +6,11 @@ mod archive;
 mod hdf5;
 mod level5;
 
+use crate::silent::caught;
 use crate::{EntryError, Error, MatrixError, open_regular, quote};
 use nalgebra::DMatrix;
 use std::collections::BTreeMap;
 use std::io::Read;
-use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::Path;
 
 /// The most bytes of a file that are read: matrices of control models are small.
@@ -47,8 +47,7 @@ impl Matrices {
             });
         }
         // The readers of damaged files are not proof against every length that a file may claim.
-        let found = catch_unwind(AssertUnwindSafe(|| parse(bytes)))
-            .unwrap_or_else(|_| Err(MatrixError::Damaged.into()))?;
+        let found = caught(|| parse(bytes)).unwrap_or_else(|| Err(MatrixError::Damaged.into()))?;
         if found.is_empty() {
             return Err(MatrixError::Empty.into());
         }

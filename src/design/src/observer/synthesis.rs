@@ -82,6 +82,7 @@ fn unknown_input(
     scaling: &Scaling,
 ) -> Result<ObserverDesign, DesignError> {
     let units = units(scaling);
+    check_shown(plant, spec, &units.per_unit())?;
     let h = decoupling(plant, &units.per_unit())?;
     if h.iter().flatten().all(|h| h.amax() == 0.0) {
         return Err(RequestError::NoDisturbance.into());
@@ -149,6 +150,8 @@ fn units(scaling: &Scaling) -> OwnedUnits {
 struct ErrorModel {
     projected: Vec<Vec<DMatrix<f64>>>,
     outputs: Vec<DMatrix<f64>>,
+    /// Whether any `H` is not zero.
+    decoupled: bool,
 }
 
 impl ErrorModel {
@@ -161,6 +164,7 @@ impl ErrorModel {
         });
         Self {
             projected: projected.collect(),
+            decoupled: h.iter().flatten().any(|h| h.amax() > 0.0),
             outputs,
         }
     }
@@ -169,17 +173,33 @@ impl ErrorModel {
     fn check_detectable(&self, spec: &ObserverSpec) -> Result<(), DesignError> {
         for (i, j) in spec.lyapunov.observer_pairs(self.outputs.len()) {
             let found = check_detectable(&self.projected[i][j], &self.outputs[i], spec.decay);
-            if let Err(magnitude) = found {
-                return Err(RequestError::Undetectable {
-                    mode: i + 1,
-                    decay: spec.decay,
-                    magnitude,
-                }
-                .into());
-            }
+            found.map_err(|magnitude| RequestError::Undetectable {
+                mode: i + 1,
+                decay: spec.decay,
+                magnitude,
+                decoupled: self.decoupled,
+            })?;
         }
         Ok(())
     }
+}
+
+/// What the outputs do not show without decoupling, they do not show with it.
+fn check_shown(
+    plant: &SwitchedPlant,
+    spec: &ObserverSpec,
+    units: &PerUnit,
+) -> Result<(), RequestError> {
+    for (index, mode) in plant.modes.iter().enumerate() {
+        let found = check_detectable(&units.a(mode), &units.c(mode), spec.decay);
+        found.map_err(|magnitude| RequestError::Undetectable {
+            mode: index + 1,
+            decay: spec.decay,
+            magnitude,
+            decoupled: false,
+        })?;
+    }
+    Ok(())
 }
 
 /// The unknowns `P`, `N`, `W` of one mode.

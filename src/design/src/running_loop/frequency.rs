@@ -7,7 +7,7 @@ use std::f64::consts::PI;
 
 /// `c (z I - a)^-1 b + d` with `a` in upper Hessenberg form; transposed where that leaves fewer
 /// columns to solve for.
-pub(super) struct Response {
+pub(crate) struct Response {
     /// Rows of `a`, one after the other.
     a: Vec<f64>,
     /// Columns of `b`.

@@ -82,7 +82,12 @@ fn step(mode: usize, model: &Loop) -> Step {
 }
 
 impl TransferCertificate {
-    /// Samples that must pass between resets (and under `dwell` between switches).
+    /// Whether each mode must last for that many samples; else modes may change at any.
+    pub fn needs_dwell(&self) -> bool {
+        self.lyapunov.len() > 1
+    }
+
+    /// Samples that must pass between resets (and where modes have to last, between switches).
     pub fn samples(&self) -> usize {
         let samples = self.mu.max(1.0).ln() / (-2.0 * self.decay.ln()) * (1.0 + 1e-12);
         // The cast saturates.

@@ -1,0 +1,122 @@
+//! Faults of sensors and actuators, as the user writes them.
+
+use crate::check;
+use crate::signal::{endless, finite, interval, only, positive, present};
+use crate::values::Which;
+use ftc_plant::scenario::{FaultEvent, FaultKind};
+use serde::Deserialize;
+
+/// A fault of one sensor or actuator during `[from, until)` seconds.
+#[derive(Clone, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Event {
+    kind: Kind,
+    sensor: Option<Which>,
+    input: Option<Which>,
+    /// Seconds.
+    from: f64,
+    #[serde(default = "endless")]
+    until: f64,
+    size: Option<f64>,
+    slope: Option<f64>,
+    loss: Option<f64>,
+    period: Option<f64>,
+}
+
+/// Values of an event's `kind`.
+#[derive(Clone, Copy, Debug, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+enum Kind {
+    /// Adds `size`.
+    Bias,
+    /// Adds `slope` per second.
+    Drift,
+    /// Loses the fraction `loss` of the reading.
+    GainLoss,
+    /// Keeps the last reading.
+    Stuck,
+    /// Adds `size` during the first half of each `period`.
+    Intermittent,
+    /// Gives no number.
+    Dropout,
+}
+
+impl Kind {
+    /// Its name, and the keys that describe it.
+    fn keys(self) -> (&'static str, &'static [&'static str]) {
+        match self {
+            Self::Bias => ("bias", &["size"]),
+            Self::Drift => ("drift", &["slope"]),
+            Self::GainLoss => ("gain-loss", &["loss"]),
+            Self::Stuck => ("stuck", &[]),
+            Self::Intermittent => ("intermittent", &["size", "period"]),
+            Self::Dropout => ("dropout", &[]),
+        }
+    }
+}
+
+impl Event {
+    /// The event for a plant with sensors of these names.
+    ///
+    /// # Errors
+    /// One sentence, to be put after the event's key.
+    pub(crate) fn fault(&self, sensors: &[&str]) -> Result<FaultEvent, String> {
+        self.fault_of("sensor", sensors, "outputs")
+    }
+
+    /// The event for an actuator of a plant with inputs of these names.
+    ///
+    /// # Errors
+    /// One sentence, to be put after the event's key.
+    pub(crate) fn actuator_fault(&self, inputs: &[&str]) -> Result<FaultEvent, String> {
+        self.fault_of("input", inputs, "inputs")
+    }
+
+    fn fault_of(&self, what: &str, names: &[&str], things: &str) -> Result<FaultEvent, String> {
+        let (name, keys) = self.kind.keys();
+        only(
+            name,
+            keys,
+            &[
+                ("size", self.size.is_some()),
+                ("slope", self.slope.is_some()),
+                ("loss", self.loss.is_some()),
+                ("period", self.period.is_some()),
+            ],
+        )?;
+        let size = || present("size", self.size).and_then(|size| finite("size", size));
+        let kind = match self.kind {
+            Kind::Bias => FaultKind::Bias { size: size()? },
+            Kind::Drift => FaultKind::Drift {
+                slope: finite("slope", present("slope", self.slope)?)?,
+            },
+            Kind::GainLoss => {
+                let loss = present("loss", self.loss)?;
+                check::fraction(loss).map_err(|what| format!("loss {what}"))?;
+                FaultKind::GainLoss { loss }
+            }
+            Kind::Stuck => FaultKind::Stuck,
+            Kind::Intermittent => FaultKind::Intermittent {
+                size: size()?,
+                period: positive("period", present("period", self.period)?)?,
+            },
+            Kind::Dropout => FaultKind::Dropout,
+        };
+        interval(self.from, self.until)?;
+        Ok(FaultEvent {
+            sensor: self.place(what)?.index(what, names, things)?,
+            from: self.from,
+            until: self.until,
+            kind,
+        })
+    }
+
+    /// Which sensor or actuator fails: `sensor` and `input` mean the same here.
+    fn place(&self, what: &str) -> Result<&Which, String> {
+        match (&self.sensor, &self.input) {
+            (Some(place), None) | (None, Some(place)) => Ok(place),
+            (Some(_), Some(_)) => Err(format!("sensor and input are both given: keep {what}")),
+            (None, None) => Err(format!("{what} is missing: add its number or its name")),
+        }
+    }
+}
