@@ -144,10 +144,9 @@ fn resets_more_often_than_proved_are_refused() {
 
     // Nor does a gain across switches hold that was proved without the resets.
     let mut claimed = design.clone();
-    claimed.proof.as_mut().unwrap().running_loop.switching = Some(SwitchingGain {
-        gamma: 1e9,
-        lyapunov: Vec::new(),
-    });
+    let claim = serde_json::json!({ "gamma": 1e9, "lyapunov": [] });
+    claimed.proof.as_mut().unwrap().running_loop.switching =
+        Some(serde_json::from_value(claim).unwrap());
     let sentence = ftc_design::coverage::prove(&claimed)
         .unwrap_err()
         .to_string();
