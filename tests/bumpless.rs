@@ -7,9 +7,7 @@
 use ftc_control::parameters::{Compensation, EstimatorMethod};
 use ftc_control::{Compensate, Controller};
 use ftc_design::assembly::{DatabaseSource, EstimatorSpec, Request, assemble};
-use ftc_design::{
-    ControlSpec, Design, Lyapunov, Objective, ObserverChoice, ObserverSpec, Signals, SwitchingGain,
-};
+use ftc_design::{ControlSpec, Design, Lyapunov, Objective, ObserverChoice, ObserverSpec, Signals};
 use ftc_plant::scenario::{ModeInterval, Waveform};
 use ftc_plant::{Mode, OperatingPoint, Scenario, SwitchedPlant, TruePlant};
 use nalgebra::{DMatrix, DVector};
