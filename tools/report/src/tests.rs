@@ -2,6 +2,7 @@
 
 use super::figure::{Figure, Mark, Series};
 use super::page::{Column, KeyNumber, Page, Row, Section, Table};
+use super::simulate::SimulateError;
 use super::{demo, svg};
 use ftc_control::parameters::{
     Compensation, Estimator, EstimatorMethod, FeedbackGains, Observer, ObserverKind, StateFeedback,
@@ -362,11 +363,13 @@ fn a_scenario_that_is_too_long_is_refused_with_an_estimate() {
     let mut design = paper(0.0);
     let one = crate::simulate::memory(&design, false) / design.scenario.steps;
     design.scenario.steps = 1_000_000_000;
-    let Err(what) = crate::simulate::simulate(&design, Vec::new(), false) else {
+    let refused = crate::simulate::simulate(&design, Vec::new(), false);
+    let Err(error @ SimulateError::TooLong { most, .. }) = refused else {
         panic!("it ran")
     };
+    let what = error.to_string();
     assert!(what.contains("scenario.steps is 1000000000"), "{what}");
-    let most: u64 = what.rsplit(' ').next().unwrap().parse().unwrap();
+    assert!(what.ends_with(&format!("at most {most}")), "{what}");
     assert!(most.abs_diff((8 << 30) / one) <= 1, "{what}");
     // A sample takes at least its numbers.
     let record = &simulate(&paper(0.0))[0].records[0];
