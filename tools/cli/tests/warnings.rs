@@ -436,6 +436,19 @@ disturbance = [{ kind = "sine", amplitude = 0.01, period = 20 }]
             "observer.kind = auto",
         ],
     );
+    // Without noise nothing is known of what it does to the command.
+    let noise = |text: &str| {
+        let bench = Bench::new(text);
+        let known = bench.run(&["design", FILE, "--json"]).json()["command_noise"].is_array();
+        let said = bench.run(&["design", FILE]).stdout();
+        assert_eq!(
+            known,
+            !said.contains("noise on the command not known without scenario.noise"),
+            "{said}"
+        );
+        known
+    };
+    assert!(noise(unstable) && !noise(&unstable.replace("noise = 0.01\n", "")));
     let best = unstable.replace("\"luenberger\"", "\"auto\"");
     assert_eq!(of_design(&Bench::new(best)), Vec::<String>::new());
 }

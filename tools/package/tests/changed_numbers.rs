@@ -10,6 +10,7 @@ mod common;
 
 use common::design;
 use ftc_control::Matrix;
+use ftc_control::parameters::EstimatorMethod;
 use ftc_design::{Design, Proof, coverage};
 use serde_json::{Number, Value};
 
@@ -122,9 +123,12 @@ fn same_claims(design: &Design, original: &Design) -> bool {
 }
 
 fn every_leaf_of(example: &str) {
-    let original = design(example);
-    proves(&original).unwrap();
-    let record = serde_json::to_value(&original).unwrap();
+    every_leaf(example, &design(example));
+}
+
+fn every_leaf(example: &str, original: &Design) {
+    proves(original).unwrap();
+    let record = serde_json::to_value(original).unwrap();
     let mut paths = Vec::new();
     leaves(&record, "", &mut paths);
     let (mut refused, mut accepted) = (0, 0);
@@ -140,7 +144,7 @@ fn every_leaf_of(example: &str) {
                 continue;
             };
             // The proofs do not read the estimator, nor what is played: they hold as before.
-            let untouched = same_claims(&design, &original);
+            let untouched = same_claims(&design, original);
             let verdict = match untouched {
                 true => design
                     .check()
@@ -153,7 +157,7 @@ fn every_leaf_of(example: &str) {
                 Ok(()) => {
                     accepted += 1;
                     assert!(
-                        harmless(path, &design, &original),
+                        harmless(path, &design, original),
                         "{example}: {path} = {change} was accepted"
                     );
                     if !path.starts_with("/proof/") {
@@ -200,6 +204,21 @@ fn of_the_paper_with_an_internal_model() {
 #[test]
 fn of_a_plant_from_logs() {
     every_leaf_of("logged.toml");
+}
+
+/// With the default estimator, whose settings the other examples do not hold.
+#[test]
+fn with_the_default_estimator() {
+    for example in [
+        "paper.toml",
+        "paper_latency.toml",
+        "tank.toml",
+        "converter.toml",
+    ] {
+        let design = common::design_with(example, EstimatorMethod::Observer);
+        assert!(design.controller.estimator.hypotheses.is_some());
+        every_leaf(example, &design);
+    }
 }
 
 /// What made a loop of |y| 0.61 reach 1e5 once: each is refused by name.
