@@ -482,4 +482,17 @@ fn bumpless_transfer_says_how_often() {
             "{text}"
         );
     }
+    let hasty = damaged(
+        "lyapunov = \"common\"\n",
+        "lyapunov = \"dwell\"\nbumpless = true\n",
+    );
+    let hasty = hasty.replace(
+        "{ from = 30, mode = 2 }]",
+        "{ from = 2, mode = 2 }, { from = 50, mode = 1 }]",
+    );
+    let warnings = of_design(&Bench::new(hasty));
+    let short = |warning: &String| {
+        warning.contains("a mode lasts 2 samples only") && warning.contains("controller.bumpless")
+    };
+    assert!(warnings.iter().any(short), "{warnings:?}");
 }
