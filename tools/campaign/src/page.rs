@@ -222,7 +222,7 @@ fn healthy(statistics: &Statistics) -> Section {
     }
     let figure = Figure::new(
         "healthy",
-        "What fault tolerance costs a loop with sound sensors",
+        "What fault tolerance costs",
         "log10 of the ratio of true errors",
         "runs up to this (%)",
     )

@@ -206,6 +206,10 @@ impl From<SolverChoice> for Solver {
 /// Seconds from which a design is said to take long before it begins.
 const LONG: f64 = 30.0;
 
+/// Bytes from which a simulation is said to need much memory before it begins.
+const LARGE: u64 = 1 << 30;
+const GIGABYTE: f64 = (1u64 << 30) as f64;
+
 /// Exit code: done.
 const DONE: u8 = 0;
 /// Exit code: no such controller, or a promise that does not hold.
@@ -320,7 +324,14 @@ fn run(
         } => {
             check_output(out)?;
             let made = solve(design, &asked(solved.as_deref(), None), &progress)?;
-            progress.tell("simulating");
+            let bytes = report::simulate::memory(&made.design, *baselines);
+            progress.tell(match bytes > LARGE {
+                true => format!(
+                    "simulating, about {:.1} GB of memory",
+                    bytes as f64 / GIGABYTE
+                ),
+                false => "simulating".into(),
+            });
             simulate(made, out, *baselines)
         }
         Command::Campaign(campaign) => {
@@ -428,7 +439,14 @@ fn beside_program() -> Result<PathBuf, Failure> {
 fn simulate(made: Made, out: &Path, baselines: bool) -> Result<String, Failure> {
     let found = report::simulate::simulate(&made.design, made.warnings, baselines)
         .map_err(Failure::Input)?;
-    write(out, &found.files)?;
+    let staging = Staging::new(out).map_err(Failure::output_directory)?;
+    staging
+        .add_written(report::simulate::TABLE, |file| {
+            found.write_table(file).map_err(std::io::Error::other)
+        })
+        .and_then(|()| add(&staging, &found.files))
+        .and_then(|()| staging.commit())
+        .map_err(Failure::output_directory)?;
     let mut text = found.summary;
     let _ = writeln!(
         text,
@@ -464,12 +482,16 @@ fn check_output(out: &Path) -> Result<(), Failure> {
 /// Writes all files, or none.
 fn write(out: &Path, files: &[(String, Vec<u8>)]) -> Result<(), Failure> {
     let staging = Staging::new(out).map_err(Failure::output_directory)?;
-    files
-        .iter()
-        .try_for_each(|(name, bytes)| staging.add(name, bytes))
+    add(&staging, files)
         .and_then(|()| staging.commit())
         .map(drop)
         .map_err(Failure::output_directory)
+}
+
+fn add(staging: &Staging, files: &[(String, Vec<u8>)]) -> Result<(), package::output::Error> {
+    files
+        .iter()
+        .try_for_each(|(name, bytes)| staging.add(name, bytes))
 }
 
 /// Reads a design file.

@@ -90,12 +90,24 @@ impl Staging {
     /// # Errors
     /// One sentence that names the directory.
     pub fn add(&self, name: &str, bytes: &[u8]) -> Result<(), Error> {
-        let write = || {
+        self.add_written(name, |file| file.write_all(bytes))
+    }
+
+    /// Adds a file that is written piece by piece.
+    ///
+    /// # Errors
+    /// One sentence that names the directory.
+    pub fn add_written(
+        &self,
+        name: &str,
+        write: impl FnOnce(&mut File) -> io::Result<()>,
+    ) -> Result<(), Error> {
+        let written = || {
             let mut file = File::create(self.folder().join(name))?;
-            file.write_all(bytes)?;
+            write(&mut file)?;
             file.sync_all()
         };
-        write().map_err(|error| blame(&self.out, &error))
+        written().map_err(|error| blame(&self.out, &error))
     }
 
     /// Moves every file into place and returns their paths in alphabetical order. Where one cannot

@@ -9,11 +9,12 @@ use ftc_simulate::baselines::comparison;
 use ftc_simulate::closed_loop::{Merits, Record};
 use ftc_simulate::{PlantSimulator, Trajectory, Variant, run};
 use serde_json::{Map, Value, json};
-use std::fmt::Write;
+use std::fmt::Write as _;
+use std::io::Write;
 
 /// Everything that `simulate` writes, and what it says.
 pub struct Simulation {
-    /// Name and contents of every file.
+    /// Name and contents of every file but the table of [`write_table`](Self::write_table).
     pub files: Vec<(String, Vec<u8>)>,
     /// The figures of merit as a table for a person.
     pub summary: String,
@@ -21,18 +22,53 @@ pub struct Simulation {
     pub warnings: Vec<String>,
     /// Every variant and baseline, sample by sample.
     pub trajectories: Vec<Trajectory>,
+    /// `Te` in seconds.
+    pub sample_time: f64,
+}
+
+/// The file of [`Simulation::write_table`].
+pub const TABLE: &str = "trajectories.csv";
+
+/// A run that keeps more bytes than this one is refused.
+const MOST_BYTES: u64 = 8 << 30;
+/// Bytes of a list, apart from its numbers: where it is and how long, and what an allocation costs.
+const LIST: u64 = 48;
+
+/// About how many bytes the samples of `simulate` take: all of them are kept for figures and page.
+pub fn memory(design: &Design, baselines: bool) -> u64 {
+    let size = design.plant.dimensions();
+    let tracked = design.controller.feedback.tracked.len();
+    let numbers = tracked + size.disturbances + 6 * size.outputs + 2 * size.states + size.inputs;
+    let (lists, runs) = (12, if baselines { 5 } else { 3 });
+    let sample = size_of::<u64>() as u64 * (2 + numbers as u64) + lists * LIST;
+    sample * runs * design.scenario.steps
+}
+
+/// Refuses a run that would keep more than a usual machine has.
+fn check_memory(design: &Design, baselines: bool) -> Result<(), String> {
+    let (bytes, steps) = (memory(design, baselines), design.scenario.steps);
+    if bytes <= MOST_BYTES {
+        return Ok(());
+    }
+    let share = MOST_BYTES as f64 / bytes as f64;
+    Err(format!(
+        "scenario.steps is {steps}: simulate keeps every sample, which would take about {} GB of memory: give at most {}",
+        bytes >> 30,
+        (share * steps as f64) as u64
+    ))
 }
 
 /// Runs the scenario in every variant, and with every baseline if asked for:
-/// `trajectories.csv`, `metrics.json`, `robustness.json` and the report. `warnings` are those of the design.
+/// `metrics.json`, `robustness.json` and the report. `warnings` are those of the design.
 ///
 /// # Errors
-/// One sentence about a baseline.
+/// One sentence about a baseline, or about the length of the scenario.
 pub fn simulate(
     design: &Design,
     mut warnings: Vec<String>,
     baselines: bool,
 ) -> Result<Simulation, String> {
+    check_memory(design, baselines)?;
     let mut trajectories = trajectories(design);
     let mut bound = None;
     if baselines {
@@ -42,14 +78,12 @@ pub fn simulate(
         bound = Some(comparison::bound(design, &trajectories[0]));
     }
     warnings.extend(warnings::of_runs(design, &trajectories));
-    let csv = table(design, &trajectories).map_err(|error| error.to_string())?;
     let metrics = metrics(design, &trajectories, bound.as_deref(), &warnings);
     let cases = robustness::cases(design);
     let worse = robustness::warnings(design, &cases);
     let tried = format!("{:#}\n", robustness::json(&cases, &worse));
     warnings.extend(worse);
     let mut files = vec![
-        ("trajectories.csv".to_string(), csv),
         ("metrics.json".to_string(), metrics.into_bytes()),
         ("robustness.json".to_string(), tried.into_bytes()),
     ];
@@ -65,7 +99,44 @@ pub fn simulate(
             + &robustness::text(design, &cases),
         warnings,
         trajectories,
+        sample_time: design.plant.sample_time,
     })
+}
+
+impl Simulation {
+    /// Writes `trajectories.csv`, one row per sample: `t`, `mode` and the signals of the scenario, then
+    /// those of each variant.
+    ///
+    /// # Errors
+    /// What the sink says.
+    pub fn write_table(&self, sink: impl Write) -> csv::Result<()> {
+        let trajectories = &self.trajectories;
+        let records = trajectories.first().map_or(&[][..], |run| &run.records);
+        let Some(first) = records.first() else {
+            return Ok(());
+        };
+        let mut table = Table::into_sink(sink, header(first, trajectories))?;
+        let mut row = Vec::new();
+        for (at, record) in records.iter().enumerate() {
+            row.clear();
+            let time = record.tick as f64 * self.sample_time;
+            row.push(number(time));
+            row.push((record.mode + 1).to_string());
+            for (_, values) in shared(record) {
+                row.extend(values.iter().map(|&value| number(value)));
+            }
+            for trajectory in trajectories {
+                let record = &trajectory.records[at];
+                for (_, values) in own(record) {
+                    row.extend(values.iter().map(|&value| number(value)));
+                }
+                let flags = record.flagged.iter();
+                row.extend(flags.map(|&flag| u8::from(flag).to_string()));
+            }
+            table.row(&row)?;
+        }
+        table.finish().map(drop)
+    }
 }
 
 fn plant(design: &Design) -> PlantSimulator {
@@ -89,39 +160,6 @@ pub fn one(design: &Design, variant: Variant) -> Trajectory {
     let controller =
         Controller::new(design.parameters()).expect("a finished design has matching sizes");
     run(&plant(design), &controller, variant)
-}
-
-/// One row per sample: `t`, `mode` and the signals of the scenario, then those of each variant.
-fn table(design: &Design, trajectories: &[Trajectory]) -> csv::Result<Vec<u8>> {
-    let records = trajectories.first().map_or(&[][..], |run| &run.records);
-    let Some(first) = records.first() else {
-        return Ok(Vec::new());
-    };
-    let mut table = Table::new(header(first, trajectories))?;
-    let mut row = Vec::new();
-    for (at, record) in records.iter().enumerate() {
-        row.clear();
-        let time = record.tick as f64 * design.plant.sample_time;
-        row.push(number(time));
-        row.push((record.mode + 1).to_string());
-        for (_, values) in shared(record) {
-            row.extend(values.iter().map(|&value| number(value)));
-        }
-        for trajectory in trajectories {
-            let record = &trajectory.records[at];
-            for (_, values) in own(record) {
-                row.extend(values.iter().map(|&value| number(value)));
-            }
-            row.extend(
-                record
-                    .flagged
-                    .iter()
-                    .map(|&flag| u8::from(flag).to_string()),
-            );
-        }
-        table.row(&row)?;
-    }
-    table.finish()
 }
 
 /// Signals that are the same in every variant.

@@ -376,3 +376,21 @@ proptest! {
         check_page(&page);
     }
 }
+
+/// What would not fit into memory is refused before it begins, with what would fit.
+#[test]
+fn a_scenario_that_is_too_long_is_refused_with_an_estimate() {
+    let mut design = paper(0.0);
+    let one = crate::simulate::memory(&design, false) / design.scenario.steps;
+    design.scenario.steps = 1_000_000_000;
+    let Err(what) = crate::simulate::simulate(&design, Vec::new(), false) else {
+        panic!("it ran")
+    };
+    assert!(what.contains("scenario.steps is 1000000000"), "{what}");
+    let most: u64 = what.rsplit(' ').next().unwrap().parse().unwrap();
+    assert!(most.abs_diff((8 << 30) / one) <= 1, "{what}");
+    // A sample takes at least its numbers.
+    let record = &simulate(&paper(0.0))[0].records[0];
+    let numbers = record.y.len() * 6 + record.x.len() * 2 + record.u.len() + record.reference.len();
+    assert!(one >= 3 * 8 * numbers as u64);
+}
