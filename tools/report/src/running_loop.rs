@@ -23,10 +23,16 @@ pub fn gains(design: &Design, proof: &Proof) -> Lines {
         lines.push((
             format!("mode {}", mode + 1),
             format!(
-                "{gamma}, noise gain {}, gain of an unnoticed fault {}, noise on the command {}",
+                "{gamma}, noise gain {}, gain of an unnoticed fault {}, {}",
                 short(running.noise_gain[mode]),
                 short(running.fault_gain[mode]),
-                with_units(&running.command_noise[mode], inputs)
+                match proof.observer.spec.noise.is_empty() {
+                    true => "noise on the command not known without scenario.noise".into(),
+                    false => format!(
+                        "noise on the command {}",
+                        with_units(&running.command_noise[mode], inputs)
+                    ),
+                }
             ),
         ));
     }

@@ -1,6 +1,6 @@
 //! The warnings of a design and of its runs, one sentence each.
 
-use crate::text::number;
+use crate::text::{count, number};
 use design_file::schema::{DesignFile, ObserverKind};
 use design_file::sentence::shorten;
 use ftc_design::state_feedback::REJECTION;
@@ -159,6 +159,11 @@ fn of_warning(file: &DesignFile, design: &Design, warning: &Warning) -> String {
         Warning::ModesTooShortToBeProved { mean, needed } => format!(
             "scenario.schedule: modes last {mean:.2} samples on average, but stability is proved only where they \
              last longer than {needed:.2}: let them last longer"
+        ),
+        Warning::ModesTooShortForTransfer { shortest, needed } => format!(
+            "scenario.schedule: a mode lasts {} only, but with controller.bumpless stability is proved only where each \
+             lasts at least {needed}: let modes last longer, or leave bumpless out",
+            count(shortest as usize, "sample")
         ),
         Warning::CostlyObserver {
             mode,
