@@ -6,7 +6,8 @@ mod adapting;
 mod random_plants;
 
 use adapting::{
-    STEPS, bears, change_gains, changed_plant, errors, play, ratio, scale_thresholds, with_faults,
+    STEPS, change_gains, changed_plant, errors, play, ratio, scale_thresholds, tolerates,
+    with_faults,
 };
 use ftc_simulate::Variant;
 use random_plants::{Dice, design};
@@ -50,7 +51,7 @@ fn a_plant_that_changed_is_predicted_better() {
         design.scenario.steps = STEPS;
         scale_thresholds(&mut design, 10.0);
         change_gains(&mut design, 1.03);
-        if !bears(&design) {
+        if !tolerates(&design) {
             continue;
         }
         let [adapted, fixed] = [true, false].map(|adapt| {

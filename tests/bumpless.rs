@@ -7,10 +7,7 @@
 use ftc_control::parameters::{Compensation, EstimatorMethod};
 use ftc_control::{Compensate, Controller};
 use ftc_design::assembly::{DatabaseSource, EstimatorSpec, Request, assemble};
-use ftc_design::{
-    ControlSpec, Design, Lyapunov, Objective, ObserverChoice, ObserverSpec, Signal, Signals,
-    SwitchingGain,
-};
+use ftc_design::{ControlSpec, Design, Lyapunov, Objective, ObserverChoice, ObserverSpec, Signals};
 use ftc_plant::scenario::{ModeInterval, Waveform};
 use ftc_plant::{Mode, OperatingPoint, Scenario, SwitchedPlant, TruePlant};
 use nalgebra::{DMatrix, DVector};
@@ -37,23 +34,9 @@ fn plant() -> SwitchedPlant {
 }
 
 fn request(lyapunov: Lyapunov, bumpless: bool) -> Request {
-    let signals = |name: &str| {
-        vec![Signal {
-            name: name.into(),
-            unit: None,
-            nominal: 1.0,
-            min: None,
-            max: None,
-        }]
-    };
     Request {
         name: "bump".into(),
-        signals: Signals {
-            inputs: signals("u"),
-            outputs: signals("y"),
-            states: signals("x"),
-            disturbances: Vec::new(),
-        },
+        signals: Signals::numbered(plant().dimensions()),
         plant: plant(),
         true_plant: TruePlant::AsDesigned,
         control: ControlSpec {
@@ -159,10 +142,9 @@ fn resets_more_often_than_proved_are_refused() {
 
     // Nor does a gain across switches hold that was proved without the resets.
     let mut claimed = design.clone();
-    claimed.proof.as_mut().unwrap().running_loop.switching = Some(SwitchingGain {
-        gamma: 1e9,
-        lyapunov: Vec::new(),
-    });
+    let claim = serde_json::json!({ "gamma": 1e9, "lyapunov": [] });
+    claimed.proof.as_mut().unwrap().running_loop.switching =
+        Some(serde_json::from_value(claim).unwrap());
     let sentence = ftc_design::coverage::prove(&claimed)
         .unwrap_err()
         .to_string();

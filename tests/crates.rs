@@ -14,12 +14,13 @@ fn root() -> &'static Path {
 }
 
 /// What each library crate may need of this project; dependencies of tests do not count.
-const ARROWS: [(&str, &[&str]); 5] = [
+const ARROWS: [(&str, &[&str]); 6] = [
     ("ftc-control", &[]),
     ("ftc-lapack", &[]),
     ("ftc-plant", &[]),
     ("ftc-design", &["ftc-control", "ftc-lapack", "ftc-plant"]),
     ("ftc-simulate", &["ftc-control", "ftc-design", "ftc-plant"]),
+    ("ftc-identify", &[]),
 ];
 
 fn packages() -> Vec<Value> {

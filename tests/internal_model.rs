@@ -8,7 +8,7 @@ use ftc_control::Controller;
 use ftc_control::parameters::{Compensation, EstimatorMethod};
 use ftc_design::assembly::{EstimatorSpec, KnownDisturbance, Request, assemble};
 use ftc_design::{
-    ControlSpec, Design, DesignError, Lyapunov, ObserverChoice, ObserverSpec, Signal, Signals,
+    ControlSpec, Design, DesignError, Lyapunov, ObserverChoice, ObserverSpec, Signals,
     check_controllable, state_feedback,
 };
 use ftc_plant::scaling::Scaling;
@@ -19,17 +19,6 @@ use nalgebra::{DMatrix, dmatrix};
 
 /// The paper's disturbance turns by this angle each sample.
 const ANGLE: f64 = 0.02;
-
-fn signals(name: &str) -> Vec<Signal> {
-    let signal = |i| Signal {
-        name: format!("{name}[{i}]"),
-        unit: None,
-        nominal: 1.0,
-        min: None,
-        max: None,
-    };
-    (1..=2).map(signal).collect()
-}
 
 /// The weights of the reference table, with the first `harmonics` in the internal model.
 fn spec(latency: usize, lyapunov: Lyapunov, decay: f64, harmonics: usize) -> ControlSpec {
@@ -55,12 +44,7 @@ fn disturbance(harmonics: usize) -> KnownDisturbance {
 fn design(channel: Channel, control: ControlSpec) -> Design {
     assemble(Request {
         name: "resonant".into(),
-        signals: Signals {
-            inputs: signals("u"),
-            outputs: signals("y"),
-            states: signals("x"),
-            disturbances: Vec::new(),
-        },
+        signals: Signals::numbered(plant(channel).dimensions()),
         plant: plant(channel),
         bumpless: false,
         feedforward: true,

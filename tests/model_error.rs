@@ -12,8 +12,7 @@ use ftc_design::assembly::{
     DatabaseSource, EstimatorSpec, KnownDisturbance, Request, Threshold, assemble,
 };
 use ftc_design::{
-    ControlSpec, Design, HypothesesSpec, ObserverChoice, ObserverSpec, Signal, Signals,
-    commissioning,
+    ControlSpec, Design, HypothesesSpec, ObserverChoice, ObserverSpec, Signals, commissioning,
 };
 use ftc_plant::SwitchedPlant;
 use ftc_plant::TruePlant;
@@ -39,18 +38,6 @@ fn disturbed(plant: &SwitchedPlant, draw: u64) -> SwitchedPlant {
     wrong
 }
 
-fn signals(name: &str) -> Vec<Signal> {
-    (1..=2)
-        .map(|i| Signal {
-            name: format!("{name}[{i}]"),
-            unit: None,
-            nominal: 1.0,
-            min: None,
-            max: None,
-        })
-        .collect()
-}
-
 /// A design for `model`, with a database logged on `truth` under its disturbance.
 fn design(model: &SwitchedPlant, truth: &SwitchedPlant, noise: f64) -> Design {
     let dims = model.dimensions();
@@ -72,12 +59,7 @@ fn design(model: &SwitchedPlant, truth: &SwitchedPlant, noise: f64) -> Design {
     };
     assemble(Request {
         name: "wrong".into(),
-        signals: Signals {
-            inputs: signals("u"),
-            outputs: signals("y"),
-            states: signals("x"),
-            disturbances: Vec::new(),
-        },
+        signals: Signals::numbered(dims),
         plant: model.clone(),
         true_plant: ftc_plant::TruePlant::AsDesigned,
         control,

@@ -1,31 +1,43 @@
 //! The design as an FMU carries it, and what the tables need of it.
 
 use crate::{Interface, SignalInfo};
-use ftc_design::{Design, Signal};
+use ftc_design::{Design, RecordError, Signal};
 
 /// Name of the design in an FMU's `resources` folder: MessagePack, the record as a map of its fields.
 pub const DESIGN_FILE: &str = "design.msgpack";
+
+/// Why the bytes of [`DESIGN_FILE`] cannot be written, or hold no design.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum DesignFileError {
+    /// The writer fails.
+    #[error(transparent)]
+    Write(#[from] rmp_serde::encode::Error),
+    /// The bytes are no record of a design.
+    #[error("{DESIGN_FILE}: {0}")]
+    Read(#[from] rmp_serde::decode::Error),
+    /// Sizes do not agree, or a value is out of its range.
+    #[error("{DESIGN_FILE}: {0}")]
+    Check(#[from] RecordError),
+}
 
 /// The bytes of [`DESIGN_FILE`]: what the binaries read of a design, which is all but its proof.
 ///
 /// # Errors
 /// What the writer says.
-pub fn write_design(design: &Design) -> Result<Vec<u8>, String> {
-    let running = Design {
-        proof: None,
-        ..design.clone()
-    };
-    rmp_serde::to_vec_named(&running).map_err(|why| why.to_string())
+pub fn write_design(design: &Design) -> Result<Vec<u8>, DesignFileError> {
+    let mut running = design.clone();
+    running.proof = None;
+    Ok(rmp_serde::to_vec_named(&running)?)
 }
 
 /// Reads the bytes of [`DESIGN_FILE`] and checks that all sizes agree.
 ///
 /// # Errors
-/// One sentence that names the file and what is wrong in it.
-pub fn read_design(bytes: &[u8]) -> Result<Design, String> {
-    let in_file = |why: &dyn std::fmt::Display| format!("{DESIGN_FILE}: {why}");
-    let design: Design = rmp_serde::from_slice(bytes).map_err(|why| in_file(&why))?;
-    design.check().map_err(|why| in_file(&why))?;
+/// Bytes that hold no design, or one whose sizes do not agree.
+pub fn read_design(bytes: &[u8]) -> Result<Design, DesignFileError> {
+    let design: Design = rmp_serde::from_slice(bytes)?;
+    design.check()?;
     Ok(design)
 }
 

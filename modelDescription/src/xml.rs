@@ -40,41 +40,61 @@ pub struct Document<'a> {
 
 type Attributes = Vec<(&'static str, String)>;
 
-/// Writes the description.
-///
-/// Fails if the table or the times make no sense (see [`VariableTable::check`]); the error
-/// names every problem.
-pub fn write(document: &Document) -> Result<String, String> {
-    check(document)?;
-    let mut writer = Writer::new_with_indent(Vec::new(), b' ', 2);
-    write_document(&mut writer, document).map_err(|error| error.to_string())?;
-    let mut bytes = writer.into_inner();
-    bytes.push(b'\n');
-    String::from_utf8(bytes).map_err(|error| error.to_string())
+/// Why a description cannot be written.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum XmlError {
+    /// Times that make no sense, in seconds.
+    #[error("stepSize {step_size} and stopTime {stop_time} must be positive numbers of seconds")]
+    Times {
+        /// The preferred communication step.
+        step_size: f64,
+        /// End of the default experiment.
+        stop_time: f64,
+    },
+    /// The model identifier names functions and files, but is no C identifier.
+    #[error("the model identifier '{0}' is no C identifier: use letters, digits and _")]
+    Identifier(String),
+    /// What is wrong with the table of variables, every problem of it.
+    #[error("{}", .0.join("; "))]
+    Table(Vec<String>),
+    /// The writer fails.
+    #[error(transparent)]
+    Write(#[from] io::Error),
+    /// What was written is not UTF-8.
+    #[error(transparent)]
+    NotUtf8(#[from] std::string::FromUtf8Error),
 }
 
-fn check(document: &Document) -> Result<(), String> {
+/// Writes the description.
+///
+/// # Errors
+/// A table or times that make no sense (see [`VariableTable::check`]); the error names every problem.
+pub fn write(document: &Document) -> Result<String, XmlError> {
+    check(document)?;
+    let mut writer = Writer::new_with_indent(Vec::new(), b' ', 2);
+    write_document(&mut writer, document)?;
+    let mut bytes = writer.into_inner();
+    bytes.push(b'\n');
+    Ok(String::from_utf8(bytes)?)
+}
+
+fn check(document: &Document) -> Result<(), XmlError> {
     let positive = |value: f64| value.is_finite() && value > 0.0;
     if !(positive(document.step_size) && positive(document.stop_time)) {
-        return Err(format!(
-            "stepSize {} and stopTime {} must be positive numbers of seconds",
-            document.step_size, document.stop_time
-        ));
+        return Err(XmlError::Times {
+            step_size: document.step_size,
+            stop_time: document.stop_time,
+        });
     }
     let mut letters = document.model_identifier.chars();
     let first = letters
         .next()
         .is_some_and(|c| c == '_' || c.is_ascii_alphabetic());
     if !(first && letters.all(|c| c == '_' || c.is_ascii_alphanumeric())) {
-        return Err(format!(
-            "the model identifier '{}' is no C identifier: use letters, digits and _",
-            document.model_identifier
-        ));
+        return Err(XmlError::Identifier(document.model_identifier.to_string()));
     }
-    document
-        .table
-        .check()
-        .map_err(|problems| problems.join("; "))
+    document.table.check().map_err(XmlError::Table)
 }
 
 fn write_document(writer: &mut Writer<Vec<u8>>, document: &Document) -> io::Result<()> {

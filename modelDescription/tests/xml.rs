@@ -199,7 +199,8 @@ fn structure_lists_every_output_with_explicit_dependencies() {
 #[test]
 fn the_same_table_gives_the_same_bytes() {
     let table = plant(&interface());
-    assert_eq!(write(&document(&table)), write(&document(&table)));
+    let [once, again] = [(); 2].map(|()| write(&document(&table)).unwrap());
+    assert_eq!(once, again);
 }
 
 #[test]
@@ -208,7 +209,7 @@ fn nonsense_is_refused_with_a_reason() {
     let with = |change: fn(&mut Document)| {
         let mut document = document(&table);
         change(&mut document);
-        write(&document).unwrap_err()
+        write(&document).unwrap_err().to_string()
     };
     assert!(with(|d| d.stop_time = 0.0).contains("stopTime 0"));
     assert!(with(|d| d.step_size = f64::NAN).contains("stepSize NaN"));
@@ -219,6 +220,6 @@ fn nonsense_is_refused_with_a_reason() {
         ..interface()
     };
     let table = controller(&spoiled);
-    let error = write(&document(&table)).unwrap_err();
+    let error = write(&document(&table)).unwrap_err().to_string();
     assert!(error.contains("threshold[1]"), "{error}");
 }

@@ -94,12 +94,10 @@ pub fn change_gains(design: &mut Design, factor: f64) {
     design.true_plant = TruePlant::Linear { plant };
 }
 
-/// Whether the loop itself bears the change: the same gains told the fault do as well as before.
-pub fn bears(design: &Design) -> bool {
-    let unchanged = Design {
-        true_plant: TruePlant::AsDesigned,
-        ..design.clone()
-    };
+/// Whether the loop itself tolerates the change: the same gains told the fault do as well as before.
+pub fn tolerates(design: &Design) -> bool {
+    let mut unchanged = design.clone();
+    unchanged.true_plant = TruePlant::AsDesigned;
     let [changed, before] = [design, &unchanged]
         .map(|design| error(design, &play(design, false, Variant::ToldTheFault)));
     changed < 1.2 * before
@@ -121,5 +119,5 @@ pub fn changed_plant(dice: &mut Dice, gain: f64, largest: f64) -> Option<Design>
     with_faults(&mut design, dice);
     scale_thresholds(&mut design, 20.0 / largest);
     change_gains(&mut design, gain);
-    bears(&design).then_some(design)
+    tolerates(&design).then_some(design)
 }

@@ -224,28 +224,10 @@ pub fn controller(channel: Channel, noise: f64) -> ControllerParameters {
 pub fn state_based(channel: Channel, noise: f64) -> ControllerParameters {
     let mut parameters = controller(channel, noise);
     let plant = plant(channel);
-    let signals = |name: &str, count: usize| -> Vec<Signal> {
-        let signal = |at| Signal {
-            name: format!("{name}[{at}]"),
-            unit: None,
-            nominal: 1.0,
-            min: None,
-            max: None,
-        };
-        (1..=count).map(signal).collect()
-    };
     let dims = plant.dimensions();
-    let signals = Signals {
-        inputs: signals("u", dims.inputs),
-        outputs: signals("y", dims.outputs),
-        states: signals("x", dims.states),
-        disturbances: signals("w", dims.disturbances),
-    };
-    let known = KnownDisturbance {
-        period: core::f64::consts::TAU / 0.02,
-        harmonics: 1,
-        amplitude: None,
-    };
+    let mut signals = Signals::numbered(dims);
+    signals.disturbances = vec![Signal::new("w"); dims.disturbances];
+    let known = KnownDisturbance::new(core::f64::consts::TAU / 0.02);
     let settings = HypothesesSpec::default().settings(
         &plant,
         &signals,

@@ -120,7 +120,7 @@ def _solve(models: list[Augmented], decay: float, solvers: tuple[str, ...]) -> t
     raise NoSolverConverged(task.status)
 
 
-def _in_coordinates(model: Augmented, T: np.ndarray) -> Augmented:
+def in_coordinates(model: Augmented, T: np.ndarray) -> Augmented:
     """Returns the model in the state X' with X = T X'."""
     inverse = np.linalg.inv(T)
     return Augmented(inverse @ model.A @ T, inverse @ model.B, inverse @ model.E, model.H @ T, model.D)
@@ -130,7 +130,7 @@ def _least_gain(models: list[Augmented], decay: float) -> float:
     _, Q = _solve(models, decay, ("SDPA", "CLARABEL"))
     values, vectors = np.linalg.eigh(Q)
     T = vectors * np.sqrt(np.maximum(values, 1e-9 * values.max()))
-    balanced = [_in_coordinates(model, T) for model in models]
+    balanced = [in_coordinates(model, T) for model in models]
     return math.sqrt(_solve(balanced, decay, ("CVXOPT", "SDPA", "CLARABEL"))[0])
 
 

@@ -3,7 +3,7 @@
 
 use ftc_control::parameters::{Compensation, EstimatorMethod};
 use ftc_design::assembly::{EstimatorSpec, KnownDisturbance, Request, assemble};
-use ftc_design::{ControlSpec, Design, Lyapunov, ObserverChoice, ObserverSpec, Signal, Signals};
+use ftc_design::{ControlSpec, Design, Lyapunov, ObserverChoice, ObserverSpec, Signals};
 use ftc_plant::Scenario;
 use ftc_plant::scenario::{ModeInterval, Waveform};
 use ftc_plant::{Mode, OperatingPoint, SwitchedPlant, spectral_radius};
@@ -49,17 +49,6 @@ fn mode(dice: &mut Dice, n: usize, m: usize, p: usize, output: &DMatrix<f64>) ->
         f: DMatrix::zeros(p, 1),
         operating_point: OperatingPoint::zero(n, m, p),
     }
-}
-
-fn signals(name: &str, count: usize) -> Vec<Signal> {
-    let signal = |i| Signal {
-        name: format!("{name}[{i}]"),
-        unit: None,
-        nominal: 1.0,
-        min: None,
-        max: None,
-    };
-    (1..=count).map(signal).collect()
 }
 
 /// A random plant with a certified design; draws until one exists.
@@ -111,12 +100,7 @@ pub fn design_with(dice: &mut Dice, method: EstimatorMethod) -> Design {
         };
         let request = Request {
             name: "random".into(),
-            signals: Signals {
-                inputs: signals("u", m),
-                outputs: signals("y", p),
-                states: signals("x", n),
-                disturbances: Vec::new(),
-            },
+            signals: Signals::numbered(dims),
             plant,
             control,
             bumpless: false,

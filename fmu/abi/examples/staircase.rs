@@ -153,7 +153,7 @@ impl Slave for Staircase {
 
     const PROVIDES_DIRECTIONAL_DERIVATIVE: bool = true;
 
-    fn load(resources: &Path, guid: &str) -> Result<Self, String> {
+    fn load(resources: &Path, guid: &str) -> Result<Self, Refusal> {
         let bytes = resource::read_verified(resources, RESOURCE, IDENTIFIER, guid)?;
         let text = String::from_utf8_lossy(&bytes);
         let sample_time = text

@@ -14,10 +14,10 @@
 //! plant) therefore gives the same values at common times whatever the steps: `Te/7`, `Te`,
 //! `3.5 Te`, irregular.
 //!
-//! **What is meant.** Importers round: 0.0166667 s for 1/60 s, 0.333 for a third. Time is kept
+//! **Rounding.** Importers round: 0.0166667 s for 1/60 s, 0.333 for a third. Time is kept
 //! as a whole number of ticks and a remainder of at most half a tick. Whenever the remainder is
-//! no more than [`MEANT`] of a tick (of the step, if that is longer), or the time since the start
-//! agrees and is that near to the tick, the importer meant the tick itself and the remainder is
+//! no more than [`ROUNDING_OF_TIME`] of a tick (of the step, if that is longer), or the time since the start
+//! agrees and is that near to the tick, the tick itself is taken for meant and the remainder is
 //! dropped. So a step within a thousandth of `Te`, or of a whole multiple or fraction of it, is
 //! taken for it, and ten million of them are as many ticks: nothing adds up. A start time of 1e9
 //! costs no accuracy. Time follows the importer's own communication points.
@@ -28,10 +28,10 @@
 use serde::{Deserialize, Serialize};
 
 /// A deviation, in units of `Te`, that is taken for rounding.
-pub const MEANT: f64 = 1e-3;
+pub const ROUNDING_OF_TIME: f64 = 1e-3;
 
 /// The most that is taken for rounding in a step of many ticks.
-const MOST_MEANT: f64 = 0.02;
+const MOST_ROUNDING: f64 = 0.02;
 
 /// How far a communication point may lie from the end of the last step, in units of `Te`.
 const NEAR: f64 = 1e-2;
@@ -61,6 +61,42 @@ pub struct Clock {
     ended: u64,
 }
 
+/// Times that make no sense to a slave. All are in seconds.
+#[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum TimeError {
+    /// The start time is infinite or no number.
+    #[error("startTime is {0}: give a finite number")]
+    Start(f64),
+    /// The stop time lies before the start time.
+    #[error("stopTime {stop} lies before startTime {start}")]
+    Stop {
+        /// The stop time.
+        stop: f64,
+        /// The start time.
+        start: f64,
+    },
+    /// The length of a step is not positive and finite.
+    #[error("communicationStepSize is {0}: give a positive number of seconds")]
+    Step(f64),
+    /// A step does not begin where the last one ended.
+    #[error("currentCommunicationPoint is {from}, but the last step ended at {last}")]
+    Point {
+        /// Where it begins.
+        from: f64,
+        /// Where the last one ended.
+        last: f64,
+    },
+    /// A step leads beyond the stop time.
+    #[error("the step ends at {to}, after stopTime {stop}")]
+    BeyondStop {
+        /// Where it ends.
+        to: f64,
+        /// The stop time.
+        stop: f64,
+    },
+}
+
 /// What happens in a step, in order.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Event {
@@ -88,14 +124,17 @@ impl Clock {
     }
 
     /// Sets the start and stop time.
-    pub fn set_up(&mut self, start: f64, stop: Option<f64>) -> Result<(), String> {
+    ///
+    /// # Errors
+    /// A start time that is not finite, a stop time before it.
+    pub fn set_up(&mut self, start: f64, stop: Option<f64>) -> Result<(), TimeError> {
         if !start.is_finite() {
-            return Err(format!("startTime is {start}: give a finite number"));
+            return Err(TimeError::Start(start));
         }
         if let Some(stop) = stop
             && (stop.is_nan() || stop < start)
         {
-            return Err(format!("stopTime {stop} lies before startTime {start}"));
+            return Err(TimeError::Stop { stop, start });
         }
         *self = Self {
             start,
@@ -115,30 +154,28 @@ impl Clock {
     /// The clock after a step of length `step` from communication point `from`.
     ///
     /// The events of the step are then had from [`Clock::next_event`]. A step of more than
-    /// [`MOST_TICKS`] ticks ends after as many. Errors: a step that is not positive and finite
-    /// (the standard asks for more than 0), a point that does not continue the last, a step
-    /// beyond the stop time.
-    pub fn advanced(&self, from: f64, step: f64) -> Result<Self, String> {
+    /// [`MOST_TICKS`] ticks ends after as many.
+    ///
+    /// # Errors
+    /// A step that is not positive and finite (the standard asks for more than 0), a point that
+    /// does not continue the last, a step beyond the stop time.
+    pub fn advanced(&self, from: f64, step: f64) -> Result<Self, TimeError> {
         if !(step.is_finite() && step > 0.0) {
-            return Err(format!(
-                "communicationStepSize is {step}: give a positive number of seconds"
-            ));
+            return Err(TimeError::Step(step));
         }
         let resolution = LAST_PLACES * ulp(from) / self.sample_time;
         let gap = |last: f64| ((from - last) / self.sample_time).abs();
         let near = NEAR + resolution;
         if !(gap(self.now) <= near || gap(self.wanted) <= near) {
-            return Err(format!(
-                "currentCommunicationPoint is {from}, but the last step ended at {}",
-                self.now
-            ));
+            let last = self.now;
+            return Err(TimeError::Point { from, last });
         }
         let to = from + step;
         // A sum of steps may overshoot by its rounding errors, never by a good part of a tick.
         if let Some(stop) = self.stop
             && to - stop > 1e-3 * self.sample_time + self.steps as f64 * ulp(to)
         {
-            return Err(format!("the step ends at {to}, after stopTime {stop}"));
+            return Err(TimeError::BeyondStop { to, stop });
         }
         let most = MOST_TICKS as f64;
         let length = (((from - self.now) + step) / self.sample_time).max(0.0);
@@ -160,7 +197,7 @@ impl Clock {
 
     /// Whether tick `k` begins after this communication point by more than is taken for rounding.
     pub fn begins_within(&self, k: u64) -> bool {
-        self.until(k) > MEANT
+        self.until(k) > ROUNDING_OF_TIME
     }
 
     /// From this communication point to the beginning of tick `k`, in units of `Te`.
@@ -240,13 +277,13 @@ impl Clock {
         let whole = (sum + 0.5).floor().max(0.0);
         self.ticks += whole as u64;
         self.remainder = sum - whole;
-        // A step no longer than its own tolerance must not be undone, else time stood still.
-        let whole_step = (MEANT * length.max(1.0)).min(MOST_MEANT);
+        // A step no longer than its own tolerance must not be undone, else time would not advance.
+        let whole_step = (ROUNDING_OF_TIME * length.max(1.0)).min(MOST_ROUNDING);
         let by_steps = (whole_step + resolution).min(length / 4.0);
-        let by_time = (MEANT + resolution).min(length / 4.0);
+        let by_time = (ROUNDING_OF_TIME + resolution).min(length / 4.0);
         let elapsed = (self.now - self.start) / self.sample_time - self.ticks as f64;
         // Steps that were taken for others have left the time since the start behind.
-        let agree = (elapsed - self.remainder).abs() <= 3.0 * MEANT;
+        let agree = (elapsed - self.remainder).abs() <= 3.0 * ROUNDING_OF_TIME;
         if self.remainder.abs() <= by_steps || (agree && elapsed.abs() <= by_time) {
             self.remainder = 0.0;
         }
@@ -254,7 +291,7 @@ impl Clock {
 
     /// A remainder that counts as none, in units of `Te`.
     fn tolerance(&self) -> f64 {
-        (MEANT + LAST_PLACES * ulp(self.now) / self.sample_time).min(0.01)
+        (ROUNDING_OF_TIME + LAST_PLACES * ulp(self.now) / self.sample_time).min(0.01)
     }
 }
 

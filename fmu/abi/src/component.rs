@@ -4,11 +4,11 @@
 //! here, and turn a [`Failure`] into a status and a message. No method here unwinds on bad
 //! input, and none allocates on success between fmi2ExitInitializationMode and fmi2Terminate.
 
-use crate::clock::{Clock, Event, MOST_TICKS};
+use crate::clock::{Clock, Event, MOST_TICKS, TimeError};
 use crate::life_cycle::{Function, State, States};
-use crate::logger::Logger;
+use crate::logger::{Logger, UnknownCategory};
 use crate::memory::{self, Reserve};
-use crate::snapshot::Snapshot;
+use crate::snapshot::{Snapshot, StateError};
 use crate::types::{Status, ValueReference};
 use crate::{Readiness, Refusal, Slave, Values};
 use model_description::{Causality, Kind, Variability, Variable, VariableTable};
@@ -57,6 +57,24 @@ impl From<String> for Failure {
 impl From<Refusal> for Failure {
     fn from(refusal: Refusal) -> Self {
         Self::error(refusal.0)
+    }
+}
+
+impl From<TimeError> for Failure {
+    fn from(error: TimeError) -> Self {
+        Self::error(error.to_string())
+    }
+}
+
+impl From<StateError> for Failure {
+    fn from(error: StateError) -> Self {
+        Self::error(error.to_string())
+    }
+}
+
+impl From<UnknownCategory> for Failure {
+    fn from(error: UnknownCategory) -> Self {
+        Self::error(error.to_string())
     }
 }
 
@@ -167,10 +185,15 @@ pub struct Component<S: Slave> {
 
 impl<S: Slave> Component<S> {
     /// A fresh instance of a loaded model.
-    pub fn new(slave: S, guid: &str, logger: Logger) -> Result<Self, String> {
+    ///
+    /// # Errors
+    /// A sample time that is not positive.
+    pub fn new(slave: S, guid: &str, logger: Logger) -> Result<Self, Refusal> {
         let period = slave.sample_time();
         if !(period.is_finite() && period > 0.0) {
-            return Err(format!("the sample time is {period}: it must be positive"));
+            return Err(Refusal(format!(
+                "the sample time is {period}: it must be positive"
+            )));
         }
         let start = Values::start(slave.variables());
         let (footprint, fresh) = memory::size_of_made(|| Snapshot::fresh(&slave));
@@ -197,7 +220,7 @@ impl<S: Slave> Component<S> {
     }
 
     /// After a panic: only free is left.
-    pub fn give_up(&mut self) {
+    pub fn make_fatal(&mut self) {
         self.current.phase = State::Fatal;
     }
 

@@ -16,7 +16,7 @@ use crate::life_cycle::Function;
 use crate::logger::Logger;
 use crate::memory::{self, Reserve};
 use crate::types::*;
-use crate::{Slave, resource};
+use crate::{Refusal, Slave, resource};
 use std::any::Any;
 use std::ffi::{CStr, c_char};
 use std::panic::{AssertUnwindSafe, catch_unwind};
@@ -67,7 +67,7 @@ fn run<S: Slave>(
         Ok(Ok(())) => return Status::Ok,
         Ok(Err(failure)) => (failure.status, failure.message),
         Err(panic) => {
-            component.give_up();
+            component.make_fatal();
             let why = panic_text(&*panic);
             (Status::Fatal, format!("a defect of this FMU: {why}"))
         }
@@ -206,15 +206,19 @@ pub unsafe fn instantiate<S: Slave>(
     };
     let mark = memory::mark();
     let make = || component::<S>(name, kind, guid, location, logger());
-    let made = catch_unwind(AssertUnwindSafe(make))
-        .unwrap_or_else(|panic| Err(format!("a defect of this FMU: {}", panic_text(&*panic))));
+    let made = catch_unwind(AssertUnwindSafe(make)).unwrap_or_else(|panic| {
+        Err(Refusal(format!(
+            "a defect of this FMU: {}",
+            panic_text(&*panic)
+        )))
+    });
     let made = match made {
         Ok(_) if memory::short_of_memory(mark) => Err(OUT_OF_MEMORY.into()),
         made => made,
     };
     match made {
         Ok((component, _reserve)) => Box::into_raw(component).cast(),
-        Err(message) => {
+        Err(Refusal(message)) => {
             logger().log(Status::Error, &format!("fmi2Instantiate: {message}"));
             std::ptr::null_mut()
         }
@@ -234,11 +238,11 @@ fn component<S: Slave>(
     guid: Option<&CStr>,
     location: Option<&CStr>,
     logger: Logger,
-) -> Result<Made<S>, String> {
+) -> Result<Made<S>, Refusal> {
     let text = |what: &str, text: Option<&CStr>| {
         let text = text.ok_or_else(|| format!("{what} is a null pointer"))?;
         let text = text.to_str().map_err(|_| format!("{what} is not UTF-8"))?;
-        Ok::<_, String>(text.to_string())
+        Ok::<_, Refusal>(text.to_string())
     };
     if name.is_none_or(|name| name.to_bytes().trim_ascii().is_empty()) {
         return Err("instanceName is a null pointer or empty: give the instance a name".into());

@@ -23,10 +23,10 @@
 //! | [`snapshot`] | what a saved state holds, and its bytes |
 //! | [`resource`] | where the resources lie and whether they belong here |
 //! | [`logger`] | what the importer is told |
-//! | [`slave`](Slave) | the seam |
+//! | [`slave`](Slave) | what an FMU computes, as a trait |
 //!
-//! The seam lies where the standard's questions end: above it there are strings, pointers,
-//! seconds and states of a protocol, below it a tick number and numbers.
+//! The trait divides what the standard prescribes from what an FMU computes: on one side there are
+//! strings, pointers, seconds and states of a protocol, on the other a tick number and numbers.
 
 pub mod clock;
 pub mod component;

@@ -25,6 +25,11 @@ pub struct Logger {
     enabled: [bool; LOG_CATEGORIES.len()],
 }
 
+/// A log category that the FMU does not have.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("there is no log category {0}")]
+pub struct UnknownCategory(pub String);
+
 impl Logger {
     /// A logger for an instance of this name; `callback` may be absent.
     pub fn new(
@@ -43,13 +48,14 @@ impl Logger {
 
     /// Switches the named categories, or all if none is named.
     ///
-    /// An unknown category is refused, and then nothing is switched.
-    pub fn switch(&mut self, on: bool, categories: &[&CStr]) -> Result<(), String> {
+    /// # Errors
+    /// An unknown category; then nothing is switched.
+    pub fn switch(&mut self, on: bool, categories: &[&CStr]) -> Result<(), UnknownCategory> {
         let known = |name: &&CStr| {
             LOG_CATEGORIES
                 .iter()
                 .position(|(category, _)| name.to_bytes() == category.as_bytes())
-                .ok_or_else(|| format!("there is no log category {}", name.to_string_lossy()))
+                .ok_or_else(|| UnknownCategory(name.to_string_lossy().into_owned()))
         };
         let chosen: Vec<usize> = categories.iter().map(known).collect::<Result<_, _>>()?;
         let all = chosen.is_empty() || chosen.contains(&ALL);

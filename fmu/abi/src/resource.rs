@@ -10,18 +10,71 @@ const LOCAL_HOST: &str = "//localhost/";
 /// The greatest resource that is read, in bytes: far more than a design has.
 pub const MOST_BYTES: u64 = 1 << 28;
 
+/// Why a resource cannot be used.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum ResourceError {
+    /// The location is not UTF-8 once it is decoded.
+    #[error("fmuResourceLocation {0} is not UTF-8 when decoded")]
+    NotUtf8(String),
+    /// The location is a URI of another kind.
+    #[error("fmuResourceLocation {0} is no file URI: unpack the FMU to a local folder")]
+    NoFileUri(String),
+    /// The location is a file URI without a path.
+    #[error("fmuResourceLocation names no folder")]
+    NoFolder,
+    /// The file is not there, or cannot be read.
+    #[error("cannot read {}: {source}", path.display())]
+    Unreadable {
+        /// The file.
+        path: PathBuf,
+        /// Why not.
+        source: std::io::Error,
+    },
+    /// A folder or a device.
+    #[error("{} is no file", .0.display())]
+    NoFile(PathBuf),
+    /// Larger than any resource is.
+    #[error("{} has {size} bytes, more than the {MOST_BYTES} that are read", path.display())]
+    TooLarge {
+        /// The file.
+        path: PathBuf,
+        /// Its size.
+        size: u64,
+    },
+    /// The file is not the one that the importer's guid was made of.
+    #[error(
+        "{} does not belong to this FMU: its fingerprint for {identifier} is {found}, \
+         but the importer handed over the guid {guid}; export the FMU again",
+        path.display()
+    )]
+    Foreign {
+        /// The file.
+        path: PathBuf,
+        /// The binary.
+        identifier: String,
+        /// Fingerprint of the file for this binary.
+        found: String,
+        /// What the importer handed over.
+        guid: String,
+    },
+}
+
 /// The folder behind `fmuResourceLocation`, as importers really write it.
 ///
 /// `file:///tmp/a%20b`, `file:/tmp/a b`, `file:////tmp`, `file://localhost/tmp`, a plain path,
 /// `file:///C:/tmp`, with or without a slash at the end. What exists under its undecoded name
 /// is taken as it stands, since some importers do not encode at all.
-pub fn folder(location: &str) -> Result<PathBuf, String> {
+///
+/// # Errors
+/// A location that is no path and no file URI.
+pub fn folder(location: &str) -> Result<PathBuf, ResourceError> {
     let raw = path_part(location)?;
     let as_written = PathBuf::from(local(raw, cfg!(windows)));
     if raw.contains('%') && !as_written.exists() {
         let decoded = percent_decode_str(raw)
             .decode_utf8()
-            .map_err(|_| format!("fmuResourceLocation {location} is not UTF-8 when decoded"))?;
+            .map_err(|_| ResourceError::NotUtf8(location.to_string()))?;
         return Ok(PathBuf::from(local(&decoded, cfg!(windows))));
     }
     Ok(as_written)
@@ -29,49 +82,56 @@ pub fn folder(location: &str) -> Result<PathBuf, String> {
 
 /// The bytes of a resource whose fingerprint is the importer's `guid`.
 ///
-/// `identifier` names the binary, see [`model_description::guid`]. A missing, truncated,
-/// altered or foreign resource, another FMU's binary and another release's XML are refused.
+/// `identifier` names the binary, see [`model_description::guid`].
+///
+/// # Errors
+/// A missing, truncated, altered or foreign resource, another FMU's binary and another release's XML.
 pub fn read_verified(
     resources: &Path,
     file: &str,
     identifier: &str,
     guid: &str,
-) -> Result<Vec<u8>, String> {
+) -> Result<Vec<u8>, ResourceError> {
     let path = resources.join(file);
     size(&path)?;
-    let bytes =
-        fs::read(&path).map_err(|error| format!("cannot read {}: {error}", path.display()))?;
+    let bytes = fs::read(&path).map_err(|error| unreadable(&path, error))?;
     let found = model_description::guid(identifier, &bytes);
     if found == guid.trim() {
         Ok(bytes)
     } else {
-        Err(format!(
-            "{} does not belong to this FMU: its fingerprint for {identifier} is {found}, \
-             but the importer handed over the guid {guid}; export the FMU again",
-            path.display()
-        ))
+        Err(ResourceError::Foreign {
+            path,
+            identifier: identifier.to_string(),
+            found,
+            guid: guid.to_string(),
+        })
     }
 }
 
-/// The size of a resource in bytes; only a file of no absurd size is one.
-pub fn size(path: &Path) -> Result<u64, String> {
-    let found =
-        fs::metadata(path).map_err(|error| format!("cannot read {}: {error}", path.display()))?;
+/// The size of a resource in bytes.
+///
+/// # Errors
+/// What is no file, or larger than [`MOST_BYTES`].
+pub fn size(path: &Path) -> Result<u64, ResourceError> {
+    let found = fs::metadata(path).map_err(|error| unreadable(path, error))?;
     if !found.is_file() {
-        return Err(format!("{} is no file", path.display()));
+        return Err(ResourceError::NoFile(path.into()));
     }
-    if found.len() > MOST_BYTES {
-        return Err(format!(
-            "{} has {} bytes, more than the {MOST_BYTES} that are read",
-            path.display(),
-            found.len()
-        ));
+    let size = found.len();
+    if size > MOST_BYTES {
+        let path = path.into();
+        return Err(ResourceError::TooLarge { path, size });
     }
-    Ok(found.len())
+    Ok(size)
+}
+
+fn unreadable(path: &Path, source: std::io::Error) -> ResourceError {
+    let path = path.into();
+    ResourceError::Unreadable { path, source }
 }
 
 /// The path in a file URI, or the location itself if it is a path.
-fn path_part(location: &str) -> Result<&str, String> {
+fn path_part(location: &str) -> Result<&str, ResourceError> {
     let Some((scheme, rest)) = location.split_once(':') else {
         return Ok(location);
     };
@@ -80,9 +140,7 @@ fn path_part(location: &str) -> Result<&str, String> {
         return Ok(location);
     }
     if !scheme.eq_ignore_ascii_case("file") {
-        return Err(format!(
-            "fmuResourceLocation {location} is no file URI: unpack the FMU to a local folder"
-        ));
+        return Err(ResourceError::NoFileUri(location.to_string()));
     }
     // The slash that makes the path absolute is kept.
     let path = match rest.get(..LOCAL_HOST.len()) {
@@ -90,7 +148,7 @@ fn path_part(location: &str) -> Result<&str, String> {
         _ => rest,
     };
     if path.is_empty() {
-        return Err("fmuResourceLocation names no folder".into());
+        return Err(ResourceError::NoFolder);
     }
     Ok(path)
 }

@@ -1,4 +1,4 @@
-//! The one seam between the C interface and what an FMU computes.
+//! The boundary between the C interface and what an FMU computes.
 //!
 //! On this side: when something is computed (the life cycle, the clock), what may be set (the
 //! table), how it is saved, refused and reported. On the other side: what is computed at a
@@ -10,13 +10,22 @@
 
 use crate::Values;
 use crate::clock::Event;
+use crate::resource::ResourceError;
 use model_description::{Span, VariableTable};
 use serde::{Serialize, de::DeserializeOwned};
 use std::path::Path;
 
-/// Why a slave did not compute: one sentence that names the variable and its value.
-#[derive(Clone, Debug, PartialEq, Eq)]
+/// Why a slave was not loaded, or did not compute: one sentence for the importer's log, which names
+/// the file, or the variable and its value.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("{0}")]
 pub struct Refusal(pub String);
+
+impl From<ResourceError> for Refusal {
+    fn from(error: ResourceError) -> Self {
+        Self(error.to_string())
+    }
+}
 
 impl From<String> for Refusal {
     fn from(message: String) -> Self {
@@ -56,8 +65,11 @@ pub trait Slave: Sized + 'static {
     /// Loads the model from the FMU's unpacked `resources` folder.
     ///
     /// `guid` is what the importer read in the XML; compare it with
-    /// [`crate::resource::read_verified`]. The error is one sentence for the importer's log.
-    fn load(resources: &Path, guid: &str) -> Result<Self, String>;
+    /// [`crate::resource::read_verified`].
+    ///
+    /// # Errors
+    /// A resource that is not this FMU's, or from which no model can be made.
+    fn load(resources: &Path, guid: &str) -> Result<Self, Refusal>;
 
     /// The variables, whose positions are the value references.
     fn variables(&self) -> &VariableTable;
@@ -146,7 +158,8 @@ pub trait Slave: Sized + 'static {
 
     /// Whether a deserialised state has the sizes of this model.
     ///
-    /// Its bytes carry a checksum and this model's fingerprint, so a mismatch takes malice.
+    /// Its bytes carry a checksum and this model's fingerprint, so they differ only where somebody altered
+    /// them on purpose.
     /// On line, sizes are not looked at again, so every slave compares them here.
     fn fits(&self, state: &Self::State) -> bool;
 }

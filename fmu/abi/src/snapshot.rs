@@ -12,6 +12,33 @@ const MARK: [u8; 8] = *b"FTCFMU\0\x03";
 /// Length of the checksum at the end.
 const CHECKSUM: usize = size_of::<u32>();
 
+/// Why a state cannot be written to bytes, or read from them.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
+pub enum StateError {
+    /// The buffer is too small.
+    #[error("there is no room for the state")]
+    NoRoom,
+    /// The state does not fit the buffer, or cannot be written.
+    #[error("the state cannot be serialised: {0}")]
+    NotSerialised(postcard::Error),
+    /// The bytes do not begin as a state does.
+    #[error("the bytes are no state of this FMU, or of another version")]
+    NoState,
+    /// The checksum does not match.
+    #[error("the bytes are damaged: their checksum does not match")]
+    Damaged,
+    /// The bytes hold something else.
+    #[error("the bytes cannot be read: {0}")]
+    Unreadable(postcard::Error),
+    /// Another FMU's state.
+    #[error("the bytes belong to the FMU with guid {0}")]
+    Foreign(String),
+    /// Sizes or a life cycle that this FMU does not have.
+    #[error("the bytes hold no state that this FMU can be in")]
+    Impossible,
+}
+
 /// Life cycle, time, values and the slave's state: what fmi2GetFMUstate saves.
 ///
 /// The logger's switches are not part of it, and neither is the model.
@@ -80,52 +107,61 @@ impl<T> Snapshot<T> {
 
     /// Writes bytes without pointers into `out`, which must have just the size they need: a mark
     /// with a version, the FMU's `guid`, the state, a checksum. Allocates nothing.
-    pub fn write_bytes(&self, guid: &str, out: &mut [u8]) -> Result<(), String>
+    ///
+    /// # Errors
+    /// A buffer of another size.
+    pub fn write_bytes(&self, guid: &str, out: &mut [u8]) -> Result<(), StateError>
     where
         T: Serialize,
     {
         let end = out.len().saturating_sub(CHECKSUM);
         let (body, checksum) = out.split_at_mut(end);
         let Some((mark, content)) = body.split_at_mut_checked(MARK.len()) else {
-            return Err("there is no room for the state".into());
+            return Err(StateError::NoRoom);
         };
         mark.copy_from_slice(&MARK);
-        postcard::to_slice(&(guid, self), content).map_err(not_serialised)?;
+        postcard::to_slice(&(guid, self), content).map_err(StateError::NotSerialised)?;
         checksum.copy_from_slice(&crc32fast::hash(body).to_le_bytes());
         Ok(())
     }
 
     /// The size of these bytes.
-    pub fn size_in_bytes(&self, guid: &str) -> Result<usize, String>
+    ///
+    /// # Errors
+    /// A state that cannot be written.
+    pub fn size_in_bytes(&self, guid: &str) -> Result<usize, StateError>
     where
         T: Serialize,
     {
         let content = ser_flavors::Size::default();
         let size = postcard::serialize_with_flavor(&(guid, self), content);
-        Ok(MARK.len() + size.map_err(not_serialised)? + CHECKSUM)
+        Ok(MARK.len() + size.map_err(StateError::NotSerialised)? + CHECKSUM)
     }
 
-    /// Reads what [`Snapshot::write_bytes`] wrote; refuses damaged and foreign bytes.
+    /// Reads what [`Snapshot::write_bytes`] wrote.
+    ///
+    /// # Errors
+    /// Damaged and foreign bytes.
     pub fn from_bytes<S: Slave<State = T>>(
         bytes: &[u8],
         guid: &str,
         slave: &S,
-    ) -> Result<Self, String>
+    ) -> Result<Self, StateError>
     where
         T: DeserializeOwned,
     {
         let end = bytes.len().saturating_sub(CHECKSUM);
         let (body, checksum) = bytes.split_at(end);
         let Some(content) = body.strip_prefix(&MARK) else {
-            return Err("the bytes are no state of this FMU, or of another version".into());
+            return Err(StateError::NoState);
         };
         if checksum != crc32fast::hash(body).to_le_bytes() {
-            return Err("the bytes are damaged: their checksum does not match".into());
+            return Err(StateError::Damaged);
         }
-        let ((of, snapshot), rest): ((String, Self), _) = postcard::take_from_bytes(content)
-            .map_err(|error| format!("the bytes cannot be read: {error}"))?;
+        let ((of, snapshot), rest): ((String, Self), _) =
+            postcard::take_from_bytes(content).map_err(StateError::Unreadable)?;
         if of != guid {
-            return Err(format!("the bytes belong to the FMU with guid {of}"));
+            return Err(StateError::Foreign(of));
         }
         let fits = snapshot.values.len() == slave.variables().len()
             && snapshot.phase.is_savable()
@@ -135,11 +171,7 @@ impl<T> Snapshot<T> {
         if fits && rest.is_empty() {
             Ok(snapshot)
         } else {
-            Err("the bytes hold no state that this FMU can be in".into())
+            Err(StateError::Impossible)
         }
     }
-}
-
-fn not_serialised(error: postcard::Error) -> String {
-    format!("the state cannot be serialised: {error}")
 }

@@ -124,9 +124,9 @@ impl Slave for ControllerFmu {
 
     const RESOURCE: &'static str = DESIGN_FILE;
 
-    fn load(resources: &Path, guid: &str) -> Result<Self, String> {
+    fn load(resources: &Path, guid: &str) -> Result<Self, Refusal> {
         let bytes = resource::read_verified(resources, DESIGN_FILE, CONTROLLER, guid)?;
-        let design = model_description::read_design(&bytes)?;
+        let design = model_description::read_design(&bytes).map_err(|error| error.to_string())?;
         let table = model_description::controller(&Interface::from(&design));
         let modes = 0..design.plant.modes.len();
         let first_mode = design.scenario.mode(0, design.plant.sample_time);

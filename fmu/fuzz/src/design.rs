@@ -7,7 +7,7 @@ use libfuzzer_sys::arbitrary::{self, Arbitrary};
 use std::path::Path;
 use std::sync::LazyLock;
 
-static HONEST: LazyLock<String> = LazyLock::new(|| serde_json::to_string(&example()).unwrap());
+static UNCHANGED: LazyLock<String> = LazyLock::new(|| serde_json::to_string(&example()).unwrap());
 
 static FOLDER: LazyLock<String> = LazyLock::new(|| {
     let folder = std::env::temp_dir().join(format!("fmu-fuzz-{}", std::process::id()));
@@ -71,8 +71,8 @@ fn edit(text: &mut String, edit: &Edit) {
 }
 
 /// The bytes of the edited design; none where the JSON is no design any more.
-fn forged(edits: &[Edit]) -> Option<Vec<u8>> {
-    let mut text = HONEST.clone();
+fn edited(edits: &[Edit]) -> Option<Vec<u8>> {
+    let mut text = UNCHANGED.clone();
     for change in edits {
         edit(&mut text, change);
     }
@@ -109,8 +109,8 @@ fn run<S: Slave>(identifier: &str, bytes: &[u8]) {
 }
 
 /// Forges a design and hands it to a slave, whose binary is called `identifier`.
-pub fn forge<S: Slave>(identifier: &str, edits: &[Edit]) {
-    let Some(bytes) = forged(&edits[..edits.len().min(8)]) else {
+pub fn load_edited<S: Slave>(identifier: &str, edits: &[Edit]) {
+    let Some(bytes) = edited(&edits[..edits.len().min(8)]) else {
         return;
     };
     std::fs::write(Path::new(&*FOLDER).join(DESIGN_FILE), &bytes).unwrap();

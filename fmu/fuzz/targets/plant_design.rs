@@ -4,8 +4,8 @@
 
 #![no_main]
 
-use fmu_fuzz::design::{Edit, forge};
+use fmu_fuzz::design::{Edit, load_edited};
 use ftc_plant_fmu::PlantFmu;
 use libfuzzer_sys::fuzz_target;
 
-fuzz_target!(|edits: Vec<Edit>| forge::<PlantFmu>("ftc_plant", &edits));
+fuzz_target!(|edits: Vec<Edit>| load_edited::<PlantFmu>("ftc_plant", &edits));

@@ -18,7 +18,7 @@ thread_local! {
 }
 
 /// Honest bytes after some ticks.
-static HONEST: LazyLock<Vec<u8>> = LazyLock::new(|| {
+static UNCHANGED: LazyLock<Vec<u8>> = LazyLock::new(|| {
     let model = Model::controller(&example());
     let it = Instance::new(fmu_host::linked!(), &model).unwrap();
     it.initialize(0.0, |_| ());
@@ -30,7 +30,7 @@ static HONEST: LazyLock<Vec<u8>> = LazyLock::new(|| {
 
 fuzz_target!(|input: (Vec<(u16, u8)>, Option<u16>, Vec<Call>)| {
     let (edits, length, calls) = input;
-    let mut bytes = HONEST[..HONEST.len() - 4].to_vec();
+    let mut bytes = UNCHANGED[..UNCHANGED.len() - 4].to_vec();
     for (at, value) in edits {
         let at = usize::from(at) % bytes.len();
         bytes[at] = value;

@@ -34,19 +34,30 @@ unsafe extern "C" fn log(to: Pointer, _: Text, status: Status, category: Text, m
     messages.lock().unwrap().push((status, category, message));
 }
 
+/// The FMU made no instance; what it wrote to the log.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("{}", .0.join("\n"))]
+pub struct NotInstantiated(pub Vec<String>);
+
 impl Instance {
-    /// Instantiates, or says what the log received.
-    pub fn new(functions: Functions, model: &Model) -> Result<Self, String> {
+    /// Instantiates.
+    ///
+    /// # Errors
+    /// What the log received.
+    pub fn new(functions: Functions, model: &Model) -> Result<Self, NotInstantiated> {
         Self::made(functions, model, &model.guid, &model.location())
     }
 
     /// The same with another guid and resource location than the model's.
+    ///
+    /// # Errors
+    /// What the log received.
     pub fn made(
         functions: Functions,
         model: &Model,
         guid: &str,
         location: &str,
-    ) -> Result<Self, String> {
+    ) -> Result<Self, NotInstantiated> {
         type Fixed = unsafe extern "C" fn(Pointer, Text, Status, Text, Text);
         let messages: Box<Messages> = Box::default();
         let callbacks = CallbackFunctions {
@@ -74,8 +85,8 @@ impl Instance {
         };
         if c.is_null() {
             let messages = messages.lock().unwrap();
-            let texts: Vec<&str> = messages.iter().map(|(_, _, text)| text.as_str()).collect();
-            return Err(texts.join("\n"));
+            let texts = messages.iter().map(|(_, _, text)| text.clone());
+            return Err(NotInstantiated(texts.collect()));
         }
         Ok(Self {
             c,

@@ -15,5 +15,5 @@ pub use exercise::{assert_nothing_is_allocated, exercise};
 pub use fmu_abi::memory::allocations;
 pub use fmu_abi::types;
 pub use functions::{Functions, Library};
-pub use instance::{Instance, Messages};
+pub use instance::{Instance, Messages, NotInstantiated};
 pub use model::Model;

@@ -5,8 +5,7 @@ mod common;
 
 use common::Channel;
 use ftc_control::Controller;
-use ftc_design::{Design, FORMAT, Signal, Signals};
-use ftc_plant::TruePlant;
+use ftc_design::{Design, Signals};
 use ftc_simulate::PlantSimulator;
 use ftc_simulate::plant::External;
 use model_description::{CONTROLLER, DESIGN_FILE, Interface, PLANT, VariableTable};
@@ -60,31 +59,10 @@ pub fn location(folder: &Path) -> String {
 /// The paper's example under noise, its modes switched at half time.
 pub fn example() -> Design {
     let controller = common::controller_design(Channel::State, 0.005);
-    let signals = |base: &str| -> Vec<Signal> {
-        let signal = |at| Signal {
-            name: format!("{base}[{at}]"),
-            unit: None,
-            nominal: 1.0,
-            min: None,
-            max: None,
-        };
-        (1..=2).map(signal).collect()
-    };
-    Design {
-        format: FORMAT,
-        name: "paper".into(),
-        signals: Signals {
-            inputs: signals("u"),
-            outputs: signals("y"),
-            states: signals("x"),
-            disturbances: Vec::new(),
-        },
-        scenario: common::scenario(common::reference("square"), 0.005, 1),
-        plant: common::plant(Channel::State),
-        controller,
-        true_plant: TruePlant::default(),
-        proof: None,
-    }
+    let plant = common::plant(Channel::State);
+    let signals = Signals::numbered(plant.dimensions());
+    let scenario = common::scenario(common::reference("square"), 0.005, 1);
+    Design::new("paper", plant, signals, controller, scenario)
 }
 
 /// Measurement and command of the native loop, controller first, at each of `ticks` ticks.

@@ -100,28 +100,28 @@ pub fn fresh(it: &Instance) {
 
 /// Plays the calls on an instance, and frees the states that are left.
 pub fn play(it: &Instance, calls: &[Call]) {
-    let mut player = Player {
+    let mut caller = Caller {
         c: it.c,
         f: *it.functions(),
         time: 0.0,
         saved: Vec::new(),
     };
     for call in calls {
-        assert_ne!(player.play(call), Status::Fatal, "{}", it.last_message());
+        assert_ne!(caller.play(call), Status::Fatal, "{}", it.last_message());
     }
-    while let Some(last) = player.saved.len().checked_sub(1) {
-        assert_eq!(player.forget_at(last), Status::Ok, "{}", it.last_message());
+    while let Some(last) = caller.saved.len().checked_sub(1) {
+        assert_eq!(caller.forget_at(last), Status::Ok, "{}", it.last_message());
     }
 }
 
-struct Player {
+struct Caller {
     c: Pointer,
     f: Functions,
     time: f64,
     saved: Vec<(Pointer, f64)>,
 }
 
-impl Player {
+impl Caller {
     fn play(&mut self, call: &Call) -> Status {
         let (c, f) = (self.c, self.f);
         // SAFETY: every pointer is null, good for its count, or comes with a count that is absurd.

@@ -148,9 +148,9 @@ impl Slave for PlantFmu {
 
     const RESOURCE: &'static str = DESIGN_FILE;
 
-    fn load(resources: &Path, guid: &str) -> Result<Self, String> {
+    fn load(resources: &Path, guid: &str) -> Result<Self, Refusal> {
         let bytes = resource::read_verified(resources, DESIGN_FILE, PLANT, guid)?;
-        let design = model_description::read_design(&bytes)?;
+        let design = model_description::read_design(&bytes).map_err(|error| error.to_string())?;
         let table = model_description::plant(&Interface::from(&design));
         let plant = design.plant;
         let modes = 0..plant.modes.len();

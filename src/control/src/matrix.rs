@@ -28,6 +28,7 @@ pub struct Matrix {
 /// The rows of a matrix differ in length.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("row {row} has {found} entries where row 1 has {expected}")]
+#[non_exhaustive]
 pub struct UnequalRows {
     /// Number of the first row that differs, from 1.
     pub row: usize,

@@ -16,6 +16,7 @@ const SMALLEST_MARGIN: f64 = 1e-8;
 
 /// What became of a printed theorem.
 #[derive(Clone, Debug, PartialEq, Serialize)]
+#[non_exhaustive]
 pub struct PrintedVerdict {
     /// The paper's equation.
     pub equation: &'static str,

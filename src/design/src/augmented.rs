@@ -29,6 +29,7 @@ use nalgebra::DMatrix;
 
 /// One mode of the augmented model, in the units it was built with.
 #[derive(Clone, Debug, PartialEq)]
+#[non_exhaustive]
 pub struct AugmentedMode {
     /// State matrix (d x d), `d = n + latency m + q` with `q = r (1 + 2 resonators)`.
     pub a: DMatrix<f64>,

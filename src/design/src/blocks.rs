@@ -31,6 +31,7 @@ pub enum BlockKind {
 
 /// The name of an inequality: its kind, the mode, and the mode that follows it.
 #[derive(Clone, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[non_exhaustive]
 pub struct BlockName {
     /// What it demands.
     pub kind: BlockKind,

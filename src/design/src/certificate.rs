@@ -28,6 +28,7 @@ use serde::{Deserialize, Serialize};
 /// `L` takes up the bad conditioning, so that the proof, stated in the coordinates `L^-1 x`, is not
 /// spoiled by rounding.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[non_exhaustive]
 pub struct FactoredLyapunov {
     /// `L` (d x d), regular.
     #[serde(with = "rows")]

@@ -156,6 +156,7 @@ pub fn commission(
 
 /// A periodic disturbance present while a database was recorded.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
 pub struct RecordedDisturbance {
     /// Period in samples.
     pub period: f64,

@@ -23,6 +23,15 @@ pub struct KnownDisturbance {
 }
 
 impl KnownDisturbance {
+    /// The fundamental alone, of a period in seconds; its size is not known.
+    pub fn new(period: f64) -> Self {
+        Self {
+            period,
+            harmonics: 1,
+            amplitude: None,
+        }
+    }
+
     /// Angle per sample (radians) of each harmonic, for [`ControlSpec::resonators`](crate::ControlSpec::resonators).
     pub fn angles(&self, sample_time: f64) -> Vec<f64> {
         let fundamental = core::f64::consts::TAU * sample_time / self.period;

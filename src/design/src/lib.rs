@@ -6,17 +6,13 @@
 //!
 //! ```
 //! use ftc_design::{ControlSpec, state_feedback};
-//! use ftc_plant::{Mode, OperatingPoint, SwitchedPlant, scaling::Scaling};
+//! use ftc_plant::{Mode, SwitchedPlant, scaling::Scaling};
 //! use nalgebra::dmatrix;
 //!
 //! let mode = |pole: f64| Mode {
-//!     name: "mode".into(),
-//!     a: dmatrix![pole, 0.1; 0.0, 0.5],
-//!     b: dmatrix![0.0; 1.0],
-//!     c: dmatrix![1.0, 0.0],
 //!     e: dmatrix![0.1; 0.0],
 //!     f: dmatrix![0.0],
-//!     operating_point: OperatingPoint::zero(2, 1, 1),
+//!     ..Mode::new(dmatrix![pole, 0.1; 0.0, 0.5], dmatrix![0.0; 1.0], dmatrix![1.0, 0.0])
 //! };
 //! let plant = SwitchedPlant { sample_time: 1.0, modes: vec![mode(0.9), mode(0.8)] };
 //! let scaling = Scaling::automatic(&plant);
@@ -55,7 +51,7 @@ pub mod observer;
 mod proof;
 mod record;
 mod request;
-pub(crate) mod riccati;
+pub mod riccati;
 pub mod running_loop;
 #[cfg(feature = "solver")]
 mod solver;

@@ -88,6 +88,7 @@ impl fmt::Display for Lyapunov {
 
 /// How long modes must last on average under [`Lyapunov::Dwell`].
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[non_exhaustive]
 pub struct DwellTime {
     /// The factor `mu` by which a Lyapunov function may grow at a switch.
     pub mu: f64,

@@ -39,6 +39,7 @@ use serde::{Deserialize, Serialize};
 
 /// A certified observer.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[non_exhaustive]
 pub struct ObserverDesign {
     /// What was asked for.
     pub spec: ObserverSpec,
@@ -58,6 +59,7 @@ pub struct ObserverDesign {
 
 /// What, beside the plant and the gains, it takes to prove an observer.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[non_exhaustive]
 pub struct ObserverCertificate {
     /// Units of the states (n), powers of two.
     pub states: Vec<f64>,

@@ -14,6 +14,7 @@ use serde::{Deserialize, Serialize};
 /// Claims of a design and what proves them, together with plant and controller.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
+#[non_exhaustive]
 pub struct Proof {
     /// Of the state feedback.
     pub state_feedback: ControlProof,
@@ -26,6 +27,7 @@ pub struct Proof {
 /// A [`StateFeedback`] without the controller's numbers.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
+#[non_exhaustive]
 pub struct ControlProof {
     /// As [`ControlSpec::lyapunov`].
     pub lyapunov: Lyapunov,
@@ -54,6 +56,7 @@ pub struct ControlProof {
 /// An [`ObserverDesign`] without the observer.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
+#[non_exhaustive]
 pub struct ObserverProof {
     /// As [`ObserverDesign::spec`].
     pub spec: ObserverSpec,

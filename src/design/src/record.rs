@@ -18,6 +18,7 @@ pub const FORMAT: u32 = 4;
 
 /// A finished design.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[non_exhaustive]
 pub struct Design {
     /// Layout version, [`FORMAT`].
     pub format: u32,
@@ -37,6 +38,19 @@ pub struct Design {
     /// What proves the gains; none where they were not made by synthesis.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub proof: Option<Proof>,
+}
+
+impl Signal {
+    /// A dimensionless signal without limits, of nominal value 1.
+    pub fn new(name: &str) -> Self {
+        Self {
+            name: name.into(),
+            unit: None,
+            nominal: 1.0,
+            min: None,
+            max: None,
+        }
+    }
 }
 
 /// What of a controller is neither the plant's nor the signals'.
@@ -67,6 +81,22 @@ pub struct Signals {
 }
 
 impl Signals {
+    /// `u[1]`, `y[1]`, `x[1]` and so on, each as [`Signal::new`]; disturbances are not described.
+    pub fn numbered(dims: Dimensions) -> Self {
+        let numbered = |letter: &str, count: usize| {
+            let numbers = 1..=count;
+            numbers
+                .map(|number| Signal::new(&format!("{letter}[{number}]")))
+                .collect()
+        };
+        Self {
+            inputs: numbered("u", dims.inputs),
+            outputs: numbered("y", dims.outputs),
+            states: numbered("x", dims.states),
+            disturbances: Vec::new(),
+        }
+    }
+
     /// The ends of each input's range (m), to which the command is clamped.
     pub fn input_limits(&self) -> Vec<Limits> {
         let of = |input: &Signal| Limits {
@@ -140,6 +170,27 @@ pub enum RecordError {
 }
 
 impl Design {
+    /// A controller that was not made by synthesis, and so has no proof, for a plant that is as it was
+    /// designed for.
+    pub fn new(
+        name: &str,
+        plant: SwitchedPlant,
+        signals: Signals,
+        controller: ControllerDesign,
+        scenario: Scenario,
+    ) -> Self {
+        Self {
+            format: FORMAT,
+            name: name.into(),
+            plant,
+            signals,
+            controller,
+            true_plant: TruePlant::default(),
+            scenario,
+            proof: None,
+        }
+    }
+
     /// The gains and the observer that run, with what proves them; none where they were not made by
     /// synthesis.
     pub fn synthesis(&self) -> Option<Synthesis> {

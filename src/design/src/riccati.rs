@@ -14,7 +14,7 @@ const CONVERGED: f64 = 1e-14;
 /// With `g = b r^-1 b'` it is the cost of the linear-quadratic regulator, with `a'`, `c' r^-1 c` and
 /// the process noise the covariance of the Kalman filter, with a negative semidefinite `g` the
 /// storage function of the bounded-real lemma.
-pub(crate) fn solve(a: &DMatrix<f64>, g: &DMatrix<f64>, h: &DMatrix<f64>) -> Option<DMatrix<f64>> {
+pub fn solve(a: &DMatrix<f64>, g: &DMatrix<f64>, h: &DMatrix<f64>) -> Option<DMatrix<f64>> {
     let identity = DMatrix::<f64>::identity(a.nrows(), a.nrows());
     let (mut a, mut g) = (a.clone(), g.clone());
     doubling(h, |h| {

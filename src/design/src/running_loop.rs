@@ -42,6 +42,7 @@ pub const TOLERANCE: f64 = 0.05;
 
 /// What is proved of the running loop. Gains are in physical units.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[non_exhaustive]
 pub struct RunningLoop {
     /// l2 gain from the disturbance to the performance signal while a mode lasts, per mode; none
     /// where the plant knows no disturbance.
@@ -66,6 +67,7 @@ pub struct RunningLoop {
 
 /// A gain that holds under arbitrary switching.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[non_exhaustive]
 pub struct SwitchingGain {
     /// The gain.
     pub gamma: f64,
@@ -75,6 +77,7 @@ pub struct SwitchingGain {
 
 /// What the loss of some sensors leaves.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[non_exhaustive]
 pub struct LostSensors {
     /// Which sensors (from 0).
     pub sensors: Vec<usize>,

@@ -35,6 +35,7 @@ use serde::{Deserialize, Serialize};
 
 /// The gains of one mode, in physical units.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[non_exhaustive]
 pub struct ModeGains {
     /// `K_i` (m x n), multiplies the deviation of the state from the operating point.
     #[serde(with = "rows")]

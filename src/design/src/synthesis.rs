@@ -20,6 +20,7 @@ use serde::{Deserialize, Serialize};
 
 /// A certified state feedback and a certified observer for one plant.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[non_exhaustive]
 pub struct Synthesis {
     /// The gains of theorem T1 or T2.
     pub state_feedback: StateFeedback,
@@ -116,6 +117,7 @@ pub fn synthesise_with(
 /// Why there is no design, and what of it was found.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[error("{error}")]
+#[non_exhaustive]
 pub struct Failure {
     /// Why there is no design.
     pub error: DesignError,

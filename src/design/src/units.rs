@@ -10,6 +10,7 @@ use serde::{Deserialize, Serialize};
 
 /// Powers of two by which signals are divided.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[non_exhaustive]
 pub struct Units {
     /// States (n).
     pub states: Vec<f64>,

@@ -11,6 +11,7 @@ use std::fmt;
 
 /// An inequality and how much of the conflict it carries.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[non_exhaustive]
 pub struct ConflictingBlock {
     /// Which one.
     #[serde(flatten)]
@@ -119,6 +120,7 @@ impl fmt::Display for Advice {
 
 /// A conflict between inequalities, found by the margin problem.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[non_exhaustive]
 pub struct Infeasibility {
     /// The largest `t` for which every normalised inequality holds with `>= t I`; not positive.
     pub margin: f64,
@@ -200,6 +202,7 @@ pub enum DesignError {
 
 /// A certificate that does not check, and what would help.
 #[derive(Clone, Debug, PartialEq)]
+#[non_exhaustive]
 pub struct Uncertified {
     /// What could not be proved.
     pub reason: CertificateError,

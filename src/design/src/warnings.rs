@@ -43,6 +43,13 @@ pub enum Warning {
         /// What is needed, in samples.
         needed: f64,
     },
+    /// A mode of the schedule is shorter than the proof of bumpless transfer needs each to be.
+    ModesTooShortForTransfer {
+        /// The shortest mode that is followed by another, in samples.
+        shortest: u64,
+        /// What each must last, in samples.
+        needed: u64,
+    },
     /// The observer makes the gain of the running loop much larger than that of a measured state.
     CostlyObserver {
         /// The mode in which it does most.
@@ -142,6 +149,7 @@ pub fn of_design(design: &Design, logged: Option<&LoggedMovement>) -> Vec<Warnin
     let mut warnings = Vec::new();
     warnings.extend(durations.too_short_to_judge(&design.controller.estimator));
     warnings.extend(durations.too_short_to_be_proved(design));
+    warnings.extend(durations.too_short_for_transfer(design));
     warnings.extend(costly_observer(design));
     warnings.extend(outside_the_database(design));
     if let Some(logged) = logged {
@@ -197,6 +205,15 @@ impl ModeDurations {
                 response_length: length,
             },
         )
+    }
+
+    /// Where modes must last for bumpless transfer, each must.
+    fn too_short_for_transfer(&self, design: &Design) -> Option<Warning> {
+        let proof = design.proof.as_ref()?;
+        let transfer = proof.running_loop.transfer.as_ref()?;
+        let needed = transfer.needs_dwell().then(|| transfer.samples() as u64)?;
+        let shortest = self.0.iter().copied().min()?;
+        (shortest < needed).then_some(Warning::ModesTooShortForTransfer { shortest, needed })
     }
 
     /// Stability under `dwell` is proved for modes that last.

@@ -18,6 +18,7 @@ const PER_SECOND: f64 = 3e9;
 
 /// What a state feedback takes, within a factor of a few.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
 pub struct Work {
     /// Memory of the Newton matrix and its factors, in bytes.
     pub bytes: f64,
@@ -32,6 +33,7 @@ pub struct Work {
      taken: reduce the number of states, inputs or modes{}",
     .work.bytes / 1e9, .work.time(), MOST_BYTES / 1e9, others(*.lyapunov)
 )]
+#[non_exhaustive]
 pub struct TooLarge {
     /// What it would take.
     pub work: Work,

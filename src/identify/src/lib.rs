@@ -21,7 +21,7 @@
 //! for k in 0..199 {
 //!     y[(k + 1, 0)] = 0.8 * y[(k, 0)] + 0.5 * u[(k, 0)];
 //! }
-//! let log = Log { inputs: u, outputs: y, modes: vec![0; 200] };
+//! let log = Log::new(u, y);
 //! let found = identify(&[log], &Settings::default())?;
 //! assert_eq!(found.order, 1);
 //! assert!((found.modes[0].a[(0, 0)] - 0.8).abs() < 1e-9);
@@ -49,6 +49,18 @@ pub struct Log {
     pub modes: Vec<usize>,
 }
 
+impl Log {
+    /// The log (samples x m, samples x p) of a plant with one mode.
+    pub fn new(inputs: DMatrix<f64>, outputs: DMatrix<f64>) -> Self {
+        let modes = vec![0; inputs.nrows()];
+        Self {
+            inputs,
+            outputs,
+            modes,
+        }
+    }
+}
+
 /// What is asked for.
 #[derive(Clone, Debug)]
 pub struct Settings {
@@ -73,6 +85,7 @@ impl Default for Settings {
 
 /// A linear mode: `x(k+1) - x0 = A (x(k) - x0) + B (u(k) - u0)`, `y(k) - y0 = C (x(k) - x0)`.
 #[derive(Clone, Debug)]
+#[non_exhaustive]
 pub struct IdentifiedMode {
     /// State matrix (n x n).
     pub a: DMatrix<f64>,
@@ -113,6 +126,7 @@ pub enum Coordinates {
 
 /// What was found.
 #[derive(Clone, Debug)]
+#[non_exhaustive]
 pub struct Identified {
     /// Number of states `n`.
     pub order: usize,
@@ -126,6 +140,7 @@ pub struct Identified {
 
 /// Why nothing was found.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
 pub enum Error {
     /// A log's parts do not fit each other.
     #[error("log {log} has {what}: give all logs the same signals, and every row a mode")]

@@ -5,9 +5,9 @@ use libc::{c_char, c_int};
 use nalgebra::DMatrix;
 
 /// A linear congruential generator of numbers in [-1, 1).
-struct Lottery(u64);
+struct Random(u64);
 
-impl Lottery {
+impl Random {
     fn number(&mut self) -> f64 {
         self.0 = self
             .0
@@ -87,23 +87,23 @@ fn merge(uplo: u8, new: &DMatrix<f64>, old: &DMatrix<f64>) -> DMatrix<f64> {
 
 #[test]
 fn dgemm_multiplies_for_every_orientation() {
-    let mut lottery = Lottery(1);
+    let mut random = Random(1);
     for case in 0..300 {
-        let (m, n, k) = (lottery.below(9), lottery.below(9), lottery.below(9));
+        let (m, n, k) = (random.below(9), random.below(9), random.below(9));
         for (ta, tb) in [(b'N', b'N'), (b'T', b'N'), (b'N', b'T'), (b'c', b't')] {
             let transposed = |flag: u8| flag != b'N';
             let a = if transposed(ta) {
-                lottery.matrix(k, m)
+                random.matrix(k, m)
             } else {
-                lottery.matrix(m, k)
+                random.matrix(m, k)
             };
             let b = if transposed(tb) {
-                lottery.matrix(n, k)
+                random.matrix(n, k)
             } else {
-                lottery.matrix(k, n)
+                random.matrix(k, n)
             };
-            let mut c = lottery.matrix(m, n);
-            let (alpha, beta) = (lottery.number(), [0.0, 1.0, lottery.number()][case % 3]);
+            let mut c = random.matrix(m, n);
+            let (alpha, beta) = (random.number(), [0.0, 1.0, random.number()][case % 3]);
             let expected = alpha * transpose_if(&a, ta) * transpose_if(&b, tb) + beta * &c;
             if beta == 0.0 {
                 // Whatever stood there, NaN included, is overwritten.
@@ -136,16 +136,16 @@ fn dgemm_multiplies_for_every_orientation() {
 
 #[test]
 fn rank_updates_touch_one_triangle_only() {
-    let mut lottery = Lottery(2);
+    let mut random = Random(2);
     for case in 0..200 {
-        let (n, k) = (1 + lottery.below(8), lottery.below(8));
+        let (n, k) = (1 + random.below(8), random.below(8));
         for uplo in [b'U', b'L'] {
             for trans in [b'N', b'T'] {
                 let shape = if trans == b'N' { (n, k) } else { (k, n) };
-                let a = lottery.matrix(shape.0, shape.1);
-                let b = lottery.matrix(shape.0, shape.1);
-                let c = lottery.matrix(n, n);
-                let (alpha, beta) = (lottery.number(), [0.0, lottery.number()][case % 2]);
+                let a = random.matrix(shape.0, shape.1);
+                let b = random.matrix(shape.0, shape.1);
+                let c = random.matrix(n, n);
+                let (alpha, beta) = (random.number(), [0.0, random.number()][case % 2]);
                 let (left, right) = (transpose_if(&a, trans), transpose_if(&b, trans));
                 let single = alpha * &left * left.transpose() + beta * &c;
                 let double =
@@ -202,12 +202,12 @@ fn potrf(uplo: u8, stored: &mut Stored) -> c_int {
 
 #[test]
 fn cholesky_reconstructs_and_solves() {
-    let mut lottery = Lottery(3);
+    let mut random = Random(3);
     for case in 0..200 {
-        let n = lottery.below(12);
-        let root = lottery.matrix(n, n + 2);
+        let n = random.below(12);
+        let root = random.matrix(n, n + 2);
         let a = &root * root.transpose();
-        let right = lottery.matrix(n, 1 + case % 3);
+        let right = random.matrix(n, 1 + case % 3);
         for uplo in [b'U', b'l'] {
             let mut factor = Stored::new(&a, case % 3);
             assert_eq!(potrf(uplo, &mut factor), 0);
@@ -330,10 +330,10 @@ const ALL: (u8, f64, f64, c_int, c_int) = (b'A', 0.0, 0.0, 0, 0);
 
 #[test]
 fn eigenvectors_reconstruct_the_matrix_from_either_triangle() {
-    let mut lottery = Lottery(4);
+    let mut random = Random(4);
     for _ in 0..100 {
-        let n = 1 + lottery.below(15);
-        let root = lottery.matrix(n, n);
+        let n = 1 + random.below(15);
+        let root = random.matrix(n, n);
         let a = &root + root.transpose();
         for uplo in [b'U', b'L'] {
             // Only the named triangle may be read.
@@ -431,13 +431,13 @@ fn svd(matrix: &DMatrix<f64>, divide: bool) -> (c_int, DMatrix<f64>, Vec<f64>, D
 
 #[test]
 fn singular_vectors_reconstruct_every_shape_and_rank() {
-    let mut lottery = Lottery(5);
+    let mut random = Random(5);
     for case in 0..200 {
-        let (m, n) = (1 + lottery.below(12), 1 + lottery.below(12));
-        let mut a = lottery.matrix(m, n);
+        let (m, n) = (1 + random.below(12), 1 + random.below(12));
+        let mut a = random.matrix(m, n);
         if case % 4 == 0 {
             // Rank one, or zero.
-            a = f64::from(case % 8) * lottery.matrix(m, 1) * lottery.matrix(1, n);
+            a = f64::from(case % 8) * random.matrix(m, 1) * random.matrix(1, n);
         }
         a *= [1.0, 1e200, 1e-200][case as usize % 3];
         let rank = m.min(n);
@@ -469,8 +469,8 @@ fn singular_vectors_reconstruct_every_shape_and_rank() {
 /// lives on them.
 #[test]
 fn small_singular_values_keep_their_digits() {
-    let mut lottery = Lottery(6);
-    let q = lottery.matrix(6, 6).qr().q();
+    let mut random = Random(6);
+    let q = random.matrix(6, 6).qr().q();
     let graded = DMatrix::from_fn(6, 6, |r, c| q[(r, c)] * 10_f64.powi(-4 * c as i32));
     let (info, _, s, _) = svd(&graded, true);
     assert_eq!(info, 0);

@@ -107,6 +107,21 @@ impl OperatingPoint {
 }
 
 impl Mode {
+    /// A mode without a name and a known disturbance, about the origin; the matrices fit together
+    /// ([`Dimensions::check`] says whether they do).
+    pub fn new(a: DMatrix<f64>, b: DMatrix<f64>, c: DMatrix<f64>) -> Self {
+        let (states, inputs, outputs) = (a.nrows(), b.ncols(), c.nrows());
+        Self {
+            name: String::new(),
+            a,
+            b,
+            c,
+            e: DMatrix::zeros(states, 0),
+            f: DMatrix::zeros(outputs, 0),
+            operating_point: OperatingPoint::zero(states, inputs, outputs),
+        }
+    }
+
     /// The affine term of the state equation, `x0 - A x0 - B u0` (n).
     pub fn state_offset(&self) -> DVector<f64> {
         let x0 = DVector::from_column_slice(&self.operating_point.x);

@@ -1,5 +1,6 @@
 //! What happens to the plant: mode schedule, references, sensor faults, disturbance, noise.
 
+use crate::Dimensions;
 use serde::{Deserialize, Serialize};
 
 /// A complete experiment; every signal is a pure function of the tick.
@@ -193,6 +194,20 @@ impl Waveform {
 }
 
 impl Scenario {
+    /// So many samples in the first mode under a reference (r), without noise, fault and disturbance.
+    pub fn new(steps: u64, reference: Vec<Waveform>, dims: Dimensions) -> Self {
+        Self {
+            steps,
+            noise: vec![0.0; dims.outputs],
+            seed: 1,
+            schedule: vec![ModeInterval { from: 0.0, mode: 0 }],
+            reference,
+            fault: vec![Waveform::ZERO; dims.outputs],
+            events: Vec::new(),
+            disturbance: vec![Waveform::ZERO; dims.disturbances],
+        }
+    }
+
     /// The mode (0-based) active at `tick`.
     pub fn mode(&self, tick: u64, sample_time: f64) -> usize {
         self.schedule

@@ -52,6 +52,7 @@ pub trait Regulator {
 
 /// A regulator's inner signals after a tick.
 #[derive(Clone, Copy, Debug)]
+#[non_exhaustive]
 pub struct Report<'a> {
     /// State estimate (n).
     pub estimate: &'a [f64],
@@ -65,6 +66,7 @@ pub struct Report<'a> {
 
 /// Every signal of one sample.
 #[derive(Clone, Debug, PartialEq, Serialize)]
+#[non_exhaustive]
 pub struct Record {
     /// Tick.
     pub tick: u64,
@@ -98,6 +100,7 @@ pub struct Record {
 
 /// One run.
 #[derive(Clone, Debug, PartialEq, Serialize)]
+#[non_exhaustive]
 pub struct Trajectory {
     /// How the controller was run.
     pub variant: Variant,
@@ -110,6 +113,7 @@ pub struct Trajectory {
 
 /// Figures of merit of one tracked output.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+#[non_exhaustive]
 pub struct Merits {
     /// What the sensor says.
     pub measured: Merit,
@@ -173,6 +177,7 @@ pub fn run(plant: &PlantSimulator, controller: &Controller, variant: Variant) ->
 
 /// One sample of a running loop.
 #[derive(Clone, Copy, Debug)]
+#[non_exhaustive]
 pub struct Seen<'a> {
     /// The plant, observed at this tick.
     pub plant: &'a PlantState,

@@ -321,7 +321,7 @@ impl PlantSimulator {
             let healthy = truth + noise;
             let mut reading = healthy + *fault;
             let mut struck = false;
-            for event in self.striking(sensor, tick, events) {
+            for event in self.acting(sensor, tick, events) {
                 reading = event.reading(reading, *last, tick, te);
                 struck = true;
             }
@@ -337,12 +337,7 @@ impl PlantSimulator {
     }
 
     /// The events present at a sensor (0-based) at `tick`; none where `events` are off.
-    fn striking(
-        &self,
-        sensor: usize,
-        tick: u64,
-        events: bool,
-    ) -> impl Iterator<Item = &FaultEvent> {
+    fn acting(&self, sensor: usize, tick: u64, events: bool) -> impl Iterator<Item = &FaultEvent> {
         let te = self.plant.sample_time;
         let all = self.scenario.events.iter();
         all.filter(move |event| events && event.sensor == sensor && event.active(tick, te))

@@ -18,7 +18,7 @@ mod statistics;
 pub use draw::{Drawn, draw};
 pub use histogram::Histogram;
 pub use partial::{MergeError, Partial, merge};
-pub use run::{Outcome, Struck, run_one};
+pub use run::{FaultDetection, Outcome, run_one};
 pub use statistics::{Healthy, KindStatistics, Statistics, Unstable, Worst};
 
 use ftc_control::Controller;
@@ -58,6 +58,26 @@ impl Default for Options {
     }
 }
 
+/// An option out of its range.
+#[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum OptionsError {
+    /// [`Options::model_error`].
+    #[error("model error is {0}: give a fraction from 0 to 1")]
+    ModelError(f64),
+    /// [`Options::model_error`] of a design whose plant is nonlinear.
+    #[error(
+        "model error is {0}, but it changes matrices and the plant of this design is nonlinear: leave it out"
+    )]
+    NoMatrices(f64),
+    /// [`Options::largest_fault`].
+    #[error("largest fault is {0}: give 1 to 1e6 thresholds")]
+    LargestFault(f64),
+    /// [`Options::most_faults`].
+    #[error("most faults is {0}: give at most 16")]
+    MostFaults(u32),
+}
+
 impl Options {
     /// These options with another seed.
     pub fn with_seed(self, seed: u64) -> Self {
@@ -79,39 +99,27 @@ impl Options {
     /// Refuses a model error that the design's plant cannot have.
     ///
     /// # Errors
-    /// One sentence.
-    pub fn check_model_error(&self, design: &Design) -> Result<(), String> {
+    /// A model error of a nonlinear plant.
+    pub fn check_model_error(&self, design: &Design) -> Result<(), OptionsError> {
         match self.model_error > 0.0 && !is_linear(design) {
-            true => Err(format!(
-                "model error is {}, but it changes matrices and the plant of this design is nonlinear: leave it out",
-                self.model_error
-            )),
+            true => Err(OptionsError::NoMatrices(self.model_error)),
             false => Ok(()),
         }
     }
 
-    /// Says in one sentence what is out of range.
+    /// Whether every option is in its range.
     ///
     /// # Errors
-    /// The name of the option and what to give.
-    pub fn check(&self) -> Result<(), String> {
+    /// The first that is not.
+    pub fn check(&self) -> Result<(), OptionsError> {
         if !(0.0..=1.0).contains(&self.model_error) {
-            return Err(format!(
-                "model error is {}: give a fraction from 0 to 1",
-                self.model_error
-            ));
+            return Err(OptionsError::ModelError(self.model_error));
         }
         if !(1.0..=1e6).contains(&self.largest_fault) {
-            return Err(format!(
-                "largest fault is {}: give 1 to 1e6 thresholds",
-                self.largest_fault
-            ));
+            return Err(OptionsError::LargestFault(self.largest_fault));
         }
         if self.most_faults > 16 {
-            return Err(format!(
-                "most faults is {}: give at most 16",
-                self.most_faults
-            ));
+            return Err(OptionsError::MostFaults(self.most_faults));
         }
         Ok(())
     }

@@ -426,10 +426,14 @@ pub fn json(whole: &Partial, asked: u64) -> Value {
 /// What a program printed by [`json()`], read back.
 ///
 /// # Errors
-/// The end of a sentence that begins with the file's name.
-pub fn read(text: &str) -> Result<Partial, String> {
-    let value: Value = serde_json::from_str(text)
-        .map_err(|error| format!("is no result of a campaign ({error}): name a campaign.json"))?;
-    serde_json::from_value(value.get("campaign").cloned().unwrap_or_default())
-        .map_err(|error| format!("is no result of a campaign ({error}): name a campaign.json"))
+/// A text that is no such thing; reads as the end of a sentence that begins with the file's name.
+pub fn read(text: &str) -> Result<Partial, ReadError> {
+    let value: Value = serde_json::from_str(text)?;
+    let whole = value.get("campaign").cloned().unwrap_or_default();
+    Ok(serde_json::from_value(whole)?)
 }
+
+/// What was read is no result of a campaign.
+#[derive(Debug, thiserror::Error)]
+#[error("is no result of a campaign ({0}): name a campaign.json")]
+pub struct ReadError(#[from] serde_json::Error);

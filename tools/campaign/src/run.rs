@@ -10,7 +10,7 @@ use ftc_simulate::{PlantSimulator, Variant};
 use serde::{Deserialize, Serialize};
 
 /// Samples after the end of a fault in which its sensor may still be accused without a false alarm.
-const GRACE: u64 = 50;
+const DETECTION_WINDOW: u64 = 50;
 /// Errors beyond this one are all alike: the loop has diverged.
 const DIVERGED: f64 = 1e12;
 
@@ -23,7 +23,7 @@ pub struct Outcome {
     /// outputs: with fault tolerance, without, told the fault.
     pub error: [f64; 3],
     /// The faults, in the order in which they were drawn.
-    pub faults: Vec<Struck>,
+    pub faults: Vec<FaultDetection>,
     /// Per sensor (p): how often it was accused while it was sound.
     pub false_alarms: Vec<u64>,
     /// Per sensor (p): samples in which it was sound.
@@ -43,7 +43,7 @@ pub struct Outcome {
 
 /// One fault and whether it was seen.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Struck {
+pub struct FaultDetection {
     /// Name of its kind.
     pub kind: String,
     /// Sensor (0-based).
@@ -61,7 +61,7 @@ pub struct Struck {
     pub hidden: bool,
 }
 
-impl Struck {
+impl FaultDetection {
     fn new(event: &FaultEvent, sample_time: f64) -> Self {
         let (kind, size) = match event.kind {
             FaultKind::Bias { size } => ("bias", size),
@@ -138,7 +138,7 @@ fn square_error(design: &Design, seen: &Seen<'_>) -> f64 {
 
 /// Who was accused when.
 struct Detection {
-    faults: Vec<Struck>,
+    faults: Vec<FaultDetection>,
     flagged: Vec<bool>,
     false_alarms: Vec<u64>,
     sound_samples: Vec<u64>,
@@ -150,13 +150,14 @@ impl Detection {
         let sensors = design.signals.outputs.len();
         let te = design.plant.sample_time;
         let events = drawn.scenario.events.iter();
-        let mut faults: Vec<Struck> = events.map(|event| Struck::new(event, te)).collect();
+        let mut faults: Vec<FaultDetection> =
+            events.map(|event| FaultDetection::new(event, te)).collect();
         for at in 0..faults.len() {
             let (sensor, from) = (faults[at].sensor, faults[at].from);
             faults[at].hidden = faults.iter().enumerate().any(|(other, fault)| {
                 other != at
                     && fault.sensor == sensor
-                    && (fault.from..fault.until + GRACE).contains(&from)
+                    && (fault.from..fault.until + DETECTION_WINDOW).contains(&from)
             });
         }
         Self {
@@ -173,7 +174,8 @@ impl Detection {
         for (sensor, &flagged) in seen.report.flagged.iter().enumerate() {
             let raised = flagged && !self.flagged[sensor];
             let mut own = self.faults.iter().filter(|fault| fault.sensor == sensor);
-            let excused = own.any(|fault| (fault.from..fault.until + GRACE).contains(&tick));
+            let excused =
+                own.any(|fault| (fault.from..fault.until + DETECTION_WINDOW).contains(&tick));
             if !excused {
                 self.sound_samples[sensor] += 1;
                 self.false_alarms[sensor] += u64::from(raised);

@@ -3,25 +3,19 @@
 //! promise: exact-campaign
 #![allow(missing_docs)]
 
+mod examples;
+
 use campaign::{MergeError, Options, Partial, draw, merge, run_one, run_shard, shard};
 use ftc_control::Controller;
 use ftc_design::Design;
 use ftc_plant::TruePlant;
 use proptest::prelude::*;
-use std::path::Path;
 use std::sync::OnceLock;
 
 /// The paper's example, shortened.
 fn design() -> &'static Design {
     static DESIGN: OnceLock<Design> = OnceLock::new();
-    DESIGN.get_or_init(|| {
-        let examples = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../examples");
-        let mut request = design_file::read(&examples.join("paper.toml"))
-            .unwrap()
-            .request;
-        request.scenario.steps = 300;
-        ftc_design::assembly::assemble(request).unwrap()
-    })
+    DESIGN.get_or_init(|| examples::design("paper.toml", |request| request.scenario.steps = 300))
 }
 
 fn whole() -> &'static Partial {
@@ -45,7 +39,7 @@ fn any_number_of_threads_gives_the_same() {
 
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(6))]
-    /// To the last digit, in any order, and after a journey through JSON.
+    /// To the last digit, in any order, and written as JSON and read back.
     #[test]
     fn any_cut_in_any_order_merges_to_the_same(cuts in prop::collection::vec(0u64..=40, 1..4), turn in 0usize..4) {
         let mut ends = cuts;

@@ -5,13 +5,15 @@
 //! promise: no-harm
 #![allow(missing_docs)]
 
+mod examples;
+
 use campaign::{Options, Outcome, draw, run_one};
 use ftc_control::Controller;
 use ftc_control::parameters::EstimatorMethod;
 use ftc_design::Design;
+use ftc_design::assembly::EstimatorSpec;
 use ftc_plant::scenario::FaultKind;
 use rayon::prelude::*;
-use std::path::Path;
 
 /// Runs per example; the seed was not used while the estimator was made.
 const RUNS: u64 = 120;
@@ -21,15 +23,14 @@ const MODEL_ERROR: f64 = 0.1;
 
 /// An example with the default estimator in place of its own.
 fn design(example: &str) -> Design {
-    let examples = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../examples");
-    let mut request = design_file::read(&examples.join(example)).unwrap().request;
-    request.estimator = ftc_design::assembly::EstimatorSpec {
-        disturbance: request.estimator.disturbance,
-        threshold: request.estimator.threshold,
-        ..Default::default()
-    };
-    assert_eq!(request.estimator.method, EstimatorMethod::Observer);
-    ftc_design::assembly::assemble(request).unwrap()
+    examples::design(example, |request| {
+        request.estimator = EstimatorSpec {
+            disturbance: request.estimator.disturbance.take(),
+            threshold: request.estimator.threshold.clone(),
+            ..EstimatorSpec::default()
+        };
+        assert_eq!(request.estimator.method, EstimatorMethod::Observer);
+    })
 }
 
 /// What happened in a run, and its true root mean square error over that without fault tolerance.

@@ -59,6 +59,7 @@ fn text(name: &str, verdicts: &Verdicts) -> String {
             margin,
             blocks,
             reason,
+            ..
         } = verdict;
         let word = if *feasible { "feasible" } else { "infeasible" };
         let _ = writeln!(text, "\n{theorem}, equation {equation}: {word}");

@@ -89,7 +89,8 @@ impl Arguments {
     /// Says what is wrong before anything is solved.
     pub fn check(&self) -> Result<(), Failure> {
         check_output(&self.out)?;
-        self.options().check().map_err(Failure::Input)
+        let checked = self.options().check();
+        checked.map_err(|error| Failure::Input(error.to_string()))
     }
 
     fn options(&self) -> Options {
@@ -167,7 +168,7 @@ fn merge(design: &Design, arguments: &Arguments) -> Result<Partial, Failure> {
 fn read(path: &Path) -> Result<Partial, Failure> {
     let text = std::fs::read_to_string(path)
         .map_err(|error| format!("cannot be read ({error}): check the path"));
-    text.and_then(|text| campaign::page::read(&text))
+    text.and_then(|text| campaign::page::read(&text).map_err(|error| error.to_string()))
         .map_err(|what| Failure::Input(format!("{}: {what}", path.display())))
 }
 

@@ -84,6 +84,12 @@ impl Failure {
     }
 }
 
+impl From<String> for Failure {
+    fn from(sentence: String) -> Self {
+        Self::Input(sentence)
+    }
+}
+
 impl From<package::Error> for Failure {
     fn from(error: package::Error) -> Self {
         match error {

@@ -1,5 +1,6 @@
 //! `identify`: from logs of healthy operation to a design file.
 
+use crate::failure::Failure;
 use ftc_identify::{Coordinates, Identified, IdentifiedMode, Log, Settings};
 use ftc_tables::{Clock, Table, find_time_column};
 use std::fmt::Write;
@@ -63,6 +64,9 @@ impl Asked {
     }
 }
 
+/// Why a log cannot be used: the end of a sentence that begins with its name.
+type Unusable = Box<dyn std::error::Error>;
+
 /// One file that was read.
 struct Read {
     log: Log,
@@ -76,7 +80,7 @@ struct Read {
 ///
 /// # Errors
 /// One sentence that names the file and what to do.
-pub fn identify(asked: &Asked) -> Result<(String, String), String> {
+pub fn identify(asked: &Asked) -> Result<(String, String), Failure> {
     let name = name_of(&asked.out)?;
     let mut files: Vec<Read> = Vec::new();
     for path in &asked.logs {
@@ -97,7 +101,9 @@ pub fn identify(asked: &Asked) -> Result<(String, String), String> {
         ..Settings::default()
     };
     let found = ftc_identify::identify(&logs, &settings).map_err(|error| error.to_string())?;
-    let first = files.first().ok_or("name at least one log")?;
+    let first = files
+        .first()
+        .ok_or_else(|| Failure::Input("name at least one log".into()))?;
     let text = design_file(&name, sample_time, &found, first, asked, several)?;
     Ok((text, report(&found, &first.outputs)))
 }
@@ -113,7 +119,7 @@ fn name_of(out: &Path) -> Result<String, String> {
         .map_err(|what| format!("--out {}: the file's name {what}", out.display()))
 }
 
-fn read(path: &Path, asked: &Asked) -> Result<Read, String> {
+fn read(path: &Path, asked: &Asked) -> Result<Read, Unusable> {
     let mut table = Table::open(path)?;
     let names = table.names().to_vec();
     let inputs = columns(&names, &asked.inputs, "u", "--inputs")?;
@@ -160,7 +166,7 @@ fn read(path: &Path, asked: &Asked) -> Result<Read, String> {
 }
 
 /// The mean step of an even clock.
-fn even(clock: &Clock) -> Result<f64, String> {
+fn even(clock: &Clock) -> Result<f64, Unusable> {
     let times = clock.times();
     let (Some(first), Some(last)) = (times.first(), times.last()) else {
         return Err("it has no rows: record healthy operation".into());

@@ -344,7 +344,7 @@ fn run(
             let (folder, name) = asked.target();
             check_output(&folder)?;
             progress.tell("identifying");
-            let (text, found) = identification::identify(asked).map_err(Failure::Input)?;
+            let (text, found) = identification::identify(asked)?;
             write(&folder, &[(name.clone(), text.into_bytes())])?;
             Ok(format!("{found}wrote {}\n", folder.join(name).display()))
         }
@@ -438,7 +438,7 @@ fn beside_program() -> Result<PathBuf, Failure> {
 /// Simulates a design and writes what was found.
 fn simulate(made: Made, out: &Path, baselines: bool) -> Result<String, Failure> {
     let found = report::simulate::simulate(&made.design, made.warnings, baselines)
-        .map_err(Failure::Input)?;
+        .map_err(|error| Failure::Input(error.to_string()))?;
     let staging = Staging::new(out).map_err(Failure::output_directory)?;
     staging
         .add_written(report::simulate::TABLE, |file| {
@@ -462,7 +462,8 @@ fn reproduce(experiment: Experiment, out: &Path, progress: &Progress) -> Result<
         Experiment::Paper => reproduce::Experiment::Paper,
         Experiment::Converter => reproduce::Experiment::Converter,
     };
-    let found = reproduce::run(experiment, &|what| progress.tell(what)).map_err(Failure::Input)?;
+    let found = reproduce::run(experiment, &|what| progress.tell(what))
+        .map_err(|error| Failure::Input(error.to_string()))?;
     write(out, &found.files)?;
     let name = found.name;
     Ok(format!(

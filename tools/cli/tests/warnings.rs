@@ -436,6 +436,19 @@ disturbance = [{ kind = "sine", amplitude = 0.01, period = 20 }]
             "observer.kind = auto",
         ],
     );
+    // Without noise nothing is known of what it does to the command.
+    let noise = |text: &str| {
+        let bench = Bench::new(text);
+        let known = bench.run(&["design", FILE, "--json"]).json()["command_noise"].is_array();
+        let said = bench.run(&["design", FILE]).stdout();
+        assert_eq!(
+            known,
+            !said.contains("noise on the command not known without scenario.noise"),
+            "{said}"
+        );
+        known
+    };
+    assert!(noise(unstable) && !noise(&unstable.replace("noise = 0.01\n", "")));
     let best = unstable.replace("\"luenberger\"", "\"auto\"");
     assert_eq!(of_design(&Bench::new(best)), Vec::<String>::new());
 }
@@ -469,4 +482,17 @@ fn bumpless_transfer_says_how_often() {
             "{text}"
         );
     }
+    let hasty = damaged(
+        "lyapunov = \"common\"\n",
+        "lyapunov = \"dwell\"\nbumpless = true\n",
+    );
+    let hasty = hasty.replace(
+        "{ from = 30, mode = 2 }]",
+        "{ from = 2, mode = 2 }, { from = 50, mode = 1 }]",
+    );
+    let warnings = of_design(&Bench::new(hasty));
+    let short = |warning: &String| {
+        warning.contains("a mode lasts 2 samples only") && warning.contains("controller.bumpless")
+    };
+    assert!(warnings.iter().any(short), "{warnings:?}");
 }

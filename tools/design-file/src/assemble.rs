@@ -20,6 +20,7 @@ use ftc_design::assembly::{KnownDisturbance, Request};
 use ftc_design::{ControlSpec, Lyapunov, Objective, ObserverSpec, Signal, Signals};
 use ftc_plant::scaling::{Known, Scaling};
 use ftc_plant::{Dimensions, OperatingPoint, SwitchedPlant};
+use std::fmt::Display;
 use std::path::Path;
 
 /// The largest number of states, inputs, outputs, disturbances or modes.
@@ -85,7 +86,7 @@ pub(crate) fn request(file: &DesignFile, folder: &Path, notes: &Notes) -> Result
 }
 
 /// Puts the key before a complaint.
-pub(crate) fn at<T>(key: &str, result: Result<T, String>) -> Result<T, String> {
+pub(crate) fn at<T>(key: &str, result: Result<T, impl Display>) -> Result<T, String> {
     result.map_err(|what| format!("{key} {what}"))
 }
 
@@ -135,11 +136,9 @@ fn signals(given: &schema::Signals, found: &plant::Found) -> Result<Signals, Str
 /// The state that holds a past input.
 fn held(input: &Signal) -> Signal {
     Signal {
-        name: format!("{} held", input.name),
         unit: input.unit.clone(),
         nominal: input.nominal,
-        min: None,
-        max: None,
+        ..Signal::new(&format!("{} held", input.name))
     }
 }
 
@@ -336,7 +335,10 @@ fn tracked(
     for which in given {
         let output = which
             .index("controller.tracked:", &names, "outputs")
-            .map_err(|what| what.replace(": is", " contains an entry that is"))?;
+            .map_err(|what| {
+                what.to_string()
+                    .replace(": is", " contains an entry that is")
+            })?;
         if tracked.contains(&output) {
             return Err(format!(
                 "controller.tracked names output {which} twice: name each output once"

@@ -1,6 +1,6 @@
 //! What a value must satisfy, whatever key it stands under.
-//!
-//! Each check answers with the end of a sentence that begins with the key.
+
+use crate::sentence::shorten;
 
 /// No physical quantity in reasonable units is larger; beyond it products overflow.
 const LARGEST: f64 = 1e15;
@@ -8,92 +8,212 @@ const LARGEST: f64 = 1e15;
 /// No positive one is smaller; beyond it quotients overflow.
 const SMALLEST: f64 = 1.0 / LARGEST;
 
+/// Longest name of a design, in bytes.
+const LONGEST_NAME: usize = 64;
+
+/// Why a value is refused: the end of a sentence that begins with the key.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum ValueError {
+    /// Infinite, no number, or of impractical size.
+    #[error("is {0:e}: give a finite number of magnitude up to {LARGEST:e}")]
+    Number(f64),
+    /// Positive, but too small.
+    #[error("is {0:e}: give a number of at least {SMALLEST:e}")]
+    TooSmall(f64),
+    /// Zero or below, where only positive numbers make sense.
+    #[error("is {0}: give a positive number")]
+    NotPositive(f64),
+    /// Below zero.
+    #[error("is {0}: give 0 or a positive number")]
+    Negative(f64),
+    /// No share of a whole.
+    #[error("is {0}: give a fraction from 0 to 1")]
+    Fraction(f64),
+    /// No decay rate per sample.
+    #[error("is {0}: give a number above 0 and below 1")]
+    Decay(f64),
+    /// A count beyond its bounds.
+    #[error("is {value}: give a whole number from {least} to {most}")]
+    Count {
+        /// The count.
+        value: i64,
+        /// The least allowed.
+        least: usize,
+        /// The most allowed.
+        most: usize,
+    },
+    /// A number of a thing that does not exist. Unlike most others it begins with the key.
+    #[error("{key} is {number}: {things} are numbered from 1 to {total}")]
+    Index {
+        /// The key.
+        key: String,
+        /// The number, meant to count from 1.
+        number: i64,
+        /// How many things there are.
+        total: usize,
+        /// What they are, in the plural.
+        things: String,
+    },
+    /// A name of nothing. It begins with the key, too.
+    #[error(
+        "{key} is \"{}\", the name of none of the {things}: {advice}",
+        shorten(name)
+    )]
+    NoSuchName {
+        /// The key.
+        key: String,
+        /// The name.
+        name: String,
+        /// What things are called, in the plural.
+        things: String,
+        /// Which names there are.
+        advice: String,
+    },
+    /// A name of more than one thing. It begins with the key, too.
+    #[error(
+        "{key} is \"{}\", the name of several {things}: give the number, from 1 to {total}",
+        shorten(name)
+    )]
+    SharedName {
+        /// The key.
+        key: String,
+        /// The name.
+        name: String,
+        /// What things are called, in the plural.
+        things: String,
+        /// How many there are.
+        total: usize,
+    },
+    /// A list with another length than there are channels.
+    #[error("has {found} entries: give one number, or a list of {needed}")]
+    Entries {
+        /// Entries found.
+        found: usize,
+        /// Channels.
+        needed: usize,
+    },
+    /// No name of a design.
+    #[error(
+        "is \"{}\": give at most {LONGEST_NAME} letters, digits and underscores, not starting with a digit, since it names files and FMUs",
+        shorten(.0)
+    )]
+    Identifier(String),
+}
+
+impl From<ValueError> for String {
+    fn from(error: ValueError) -> Self {
+        error.to_string()
+    }
+}
+
 /// A finite number of practical size.
-pub fn number(value: f64) -> Result<(), String> {
-    if value.is_finite() && value.abs() <= LARGEST {
-        Ok(())
-    } else {
-        Err(format!(
-            "is {value:e}: give a finite number of magnitude up to {LARGEST:e}"
-        ))
+///
+/// # Errors
+/// Any other.
+pub fn number(value: f64) -> Result<(), ValueError> {
+    match value.is_finite() && value.abs() <= LARGEST {
+        true => Ok(()),
+        false => Err(ValueError::Number(value)),
     }
 }
 
 /// A number above zero.
-pub fn positive(value: f64) -> Result<(), String> {
+///
+/// # Errors
+/// Any other, and one too small to divide by.
+pub fn positive(value: f64) -> Result<(), ValueError> {
     number(value)?;
     if value >= SMALLEST {
         Ok(())
     } else if value > 0.0 {
-        Err(format!(
-            "is {value:e}: give a number of at least {SMALLEST:e}"
-        ))
+        Err(ValueError::TooSmall(value))
     } else {
-        Err(format!("is {value}: give a positive number"))
+        Err(ValueError::NotPositive(value))
     }
 }
 
 /// A number that is not negative.
-pub fn not_negative(value: f64) -> Result<(), String> {
+///
+/// # Errors
+/// Any other.
+pub fn not_negative(value: f64) -> Result<(), ValueError> {
     number(value)?;
-    if value >= 0.0 {
-        Ok(())
-    } else {
-        Err(format!("is {value}: give 0 or a positive number"))
+    match value >= 0.0 {
+        true => Ok(()),
+        false => Err(ValueError::Negative(value)),
     }
 }
 
 /// A share of a whole.
-pub fn fraction(value: f64) -> Result<(), String> {
-    if (0.0..=1.0).contains(&value) {
-        Ok(())
-    } else {
-        Err(format!("is {value}: give a fraction from 0 to 1"))
+///
+/// # Errors
+/// Any other.
+pub fn fraction(value: f64) -> Result<(), ValueError> {
+    match (0.0..=1.0).contains(&value) {
+        true => Ok(()),
+        false => Err(ValueError::Fraction(value)),
     }
 }
 
 /// A decay rate per sample.
-pub fn decay(value: f64) -> Result<(), String> {
-    if value > 0.0 && value < 1.0 {
-        Ok(())
-    } else {
-        Err(format!("is {value}: give a number above 0 and below 1"))
+///
+/// # Errors
+/// Any other.
+pub fn decay(value: f64) -> Result<(), ValueError> {
+    match value > 0.0 && value < 1.0 {
+        true => Ok(()),
+        false => Err(ValueError::Decay(value)),
     }
 }
 
 /// A count between two bounds.
-pub fn count(value: i64, least: usize, most: usize) -> Result<usize, String> {
+///
+/// # Errors
+/// Any other.
+pub fn count(value: i64, least: usize, most: usize) -> Result<usize, ValueError> {
     usize::try_from(value)
         .ok()
         .filter(|count| (least..=most).contains(count))
-        .ok_or_else(|| format!("is {value}: give a whole number from {least} to {most}"))
+        .ok_or(ValueError::Count { value, least, most })
 }
 
 /// A number counted from 1, as an index counted from 0.
-pub fn index(what: &str, number: i64, total: usize, things: &str) -> Result<usize, String> {
+///
+/// # Errors
+/// A number of nothing; the sentence begins with `key`.
+pub fn index(key: &str, number: i64, total: usize, things: &str) -> Result<usize, ValueError> {
     count(number, 1, total)
         .map(|number| number - 1)
-        .map_err(|_| format!("{what} is {number}: {things} are numbered from 1 to {total}"))
+        .map_err(|_| ValueError::Index {
+            key: key.to_string(),
+            number,
+            total,
+            things: things.to_string(),
+        })
 }
 
 /// Applies a check to every entry.
-pub fn each(values: &[f64], check: fn(f64) -> Result<(), String>) -> Result<(), String> {
+///
+/// # Errors
+/// The first that fails.
+pub fn each(values: &[f64], check: fn(f64) -> Result<(), ValueError>) -> Result<(), ValueError> {
     values.iter().try_for_each(|&value| check(value))
 }
 
 /// A name that can be a C identifier and a file name.
-pub fn identifier(name: &str) -> Result<(), String> {
+///
+/// # Errors
+/// Any other.
+pub fn identifier(name: &str) -> Result<(), ValueError> {
     let mut letters = name.chars();
     let first = letters
         .next()
         .is_some_and(|c| c == '_' || c.is_ascii_alphabetic());
-    if first && name.len() <= 64 && letters.all(|c| c == '_' || c.is_ascii_alphanumeric()) {
-        Ok(())
-    } else {
-        Err(format!(
-            "is \"{}\": give at most 64 letters, digits and underscores, not starting with a digit, since it names files and FMUs",
-            crate::sentence::shorten(name)
-        ))
+    let others = letters.all(|c| c == '_' || c.is_ascii_alphanumeric());
+    match first && others && name.len() <= LONGEST_NAME {
+        true => Ok(()),
+        false => Err(ValueError::Identifier(name.to_string())),
     }
 }
 

@@ -1,7 +1,7 @@
 //! Faults of sensors and actuators, as the user writes them.
 
 use crate::check;
-use crate::signal::{finite, for_ever, interval, only, positive, present};
+use crate::signal::{endless, finite, interval, only, positive, present};
 use crate::values::Which;
 use ftc_plant::scenario::{FaultEvent, FaultKind};
 use serde::Deserialize;
@@ -15,7 +15,7 @@ pub struct Event {
     input: Option<Which>,
     /// Seconds.
     from: f64,
-    #[serde(default = "for_ever")]
+    #[serde(default = "endless")]
     until: f64,
     size: Option<f64>,
     slope: Option<f64>,
@@ -60,7 +60,7 @@ impl Event {
     ///
     /// # Errors
     /// One sentence, to be put after the event's key.
-    pub fn fault(&self, sensors: &[&str]) -> Result<FaultEvent, String> {
+    pub(crate) fn fault(&self, sensors: &[&str]) -> Result<FaultEvent, String> {
         self.fault_of("sensor", sensors, "outputs")
     }
 
@@ -68,7 +68,7 @@ impl Event {
     ///
     /// # Errors
     /// One sentence, to be put after the event's key.
-    pub fn actuator_fault(&self, inputs: &[&str]) -> Result<FaultEvent, String> {
+    pub(crate) fn actuator_fault(&self, inputs: &[&str]) -> Result<FaultEvent, String> {
         self.fault_of("input", inputs, "inputs")
     }
 

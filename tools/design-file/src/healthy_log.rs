@@ -12,18 +12,21 @@ use ftc_tables::{Clock, Place, Row as Cells, Table, TimeColumn, find_time_column
 use nalgebra::DMatrix;
 use std::path::Path;
 
+/// Why a log cannot be used: the end of a sentence that begins with its name.
+type Unusable = Box<dyn std::error::Error>;
+
 /// What is logged, and where.
-pub struct Logs<'a> {
+pub(crate) struct Logs<'a> {
     /// The plant that was logged.
-    pub plant: &'a SwitchedPlant,
+    pub(crate) plant: &'a SwitchedPlant,
     /// Names of its signals.
-    pub signals: &'a Signals,
+    pub(crate) signals: &'a Signals,
     /// The design file's directory.
-    pub folder: &'a Path,
+    pub(crate) folder: &'a Path,
     /// The name of the time column, where the user gives it.
-    pub time: Option<&'a str>,
+    pub(crate) time: Option<&'a str>,
     /// What the user should know of what was read.
-    pub notes: &'a Notes,
+    pub(crate) notes: &'a Notes,
 }
 
 /// One sample of a log.
@@ -31,14 +34,6 @@ struct Row {
     mode: usize,
     inputs: Vec<f64>,
     outputs: Vec<f64>,
-}
-
-/// The log of a mode (0-based).
-pub fn file_of(files: &NameOrList, mode: usize) -> &str {
-    match files {
-        NameOrList::Name(file) => file,
-        NameOrList::List(files) => files.get(mode).map_or("", String::as_str),
-    }
 }
 
 /// Which column holds what.
@@ -54,7 +49,7 @@ impl Logs<'_> {
     ///
     /// # Errors
     /// One sentence that names the file, the row and the column.
-    pub fn read(&self, files: &NameOrList) -> Result<Vec<Vec<Database>>, String> {
+    pub(crate) fn read(&self, files: &NameOrList) -> Result<Vec<Vec<Database>>, String> {
         let modes = self.plant.modes.len();
         let mut stretches = vec![Vec::new(); modes];
         match files {
@@ -77,12 +72,12 @@ impl Logs<'_> {
                 mode + 1,
                 self.plant.modes[mode].name
             )),
-            None => self.check_alive(files, &stretches).map(|()| stretches),
+            None => self.check_moving(files, &stretches).map(|()| stretches),
         }
     }
 
     /// Refuses a sensor that says the same throughout a mode.
-    fn check_alive(&self, files: &NameOrList, stretches: &[Vec<Database>]) -> Result<(), String> {
+    fn check_moving(&self, files: &NameOrList, stretches: &[Vec<Database>]) -> Result<(), String> {
         let outputs = &self.signals.outputs;
         for (mode, stretches) in stretches.iter().enumerate() {
             let samples: usize = stretches.iter().map(Database::samples).sum();
@@ -97,7 +92,7 @@ impl Logs<'_> {
             if let Some(output) = (0..outputs.len()).find(still) {
                 return Err(format!(
                     "{}: mode {} ({}): {} never changes: record with a sensor that works",
-                    sentence::shorten(file_of(files, mode)),
+                    sentence::shorten(files.of_mode(mode)),
                     mode + 1,
                     self.plant.modes[mode].name,
                     outputs[output].name
@@ -126,14 +121,15 @@ impl Logs<'_> {
         Ok(())
     }
 
-    fn rows(&self, path: &Path, only: Option<usize>) -> Result<Vec<Row>, String> {
+    fn rows(&self, path: &Path, only: Option<usize>) -> Result<Vec<Row>, Unusable> {
         let mut table = Table::open(path)?;
         let columns = self.columns(table.names())?;
         if columns.mode.is_none() && only.is_none() && self.plant.modes.len() > 1 {
             return Err(format!(
                 "the plant has {} modes, but there is no column mode: add one, or list one file per mode",
                 self.plant.modes.len()
-            ));
+            )
+            .into());
         }
         let mut clock = columns.time.clone().map(Clock::new);
         if clock.is_none() {
@@ -159,7 +155,7 @@ impl Logs<'_> {
     }
 
     /// Finds the column of every signal.
-    fn columns(&self, header: &[String]) -> Result<Columns, String> {
+    fn columns(&self, header: &[String]) -> Result<Columns, Unusable> {
         let names: Vec<&str> = header.iter().map(String::as_str).collect();
         let known: Vec<&str> = [&self.signals.inputs, &self.signals.outputs]
             .into_iter()
@@ -196,8 +192,8 @@ impl Logs<'_> {
         columns: &Columns,
         cells: &Cells,
         only: Option<usize>,
-    ) -> Result<Row, String> {
-        let mut numbers = |at: &[usize]| -> Result<Vec<f64>, String> {
+    ) -> Result<Row, Unusable> {
+        let mut numbers = |at: &[usize]| -> Result<Vec<f64>, ftc_tables::Error> {
             at.iter().map(|&at| number(table, cells, at)).collect()
         };
         let (inputs, outputs) = (numbers(&columns.inputs)?, numbers(&columns.outputs)?);
@@ -231,7 +227,7 @@ impl Logs<'_> {
 }
 
 /// The number in a cell.
-fn number(table: &mut Table, cells: &Cells, at: usize) -> Result<f64, String> {
+fn number(table: &mut Table, cells: &Cells, at: usize) -> Result<f64, ftc_tables::Error> {
     table.number(cells, at, |value| check::number(value).is_ok())
 }
 

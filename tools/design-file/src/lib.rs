@@ -2,7 +2,7 @@
 //! one sentence that says what is wrong with which key.
 //!
 //! [`schema`] is what a file may hold, [`defaults`] what an absent key means, [`check`] what a value
-//! must satisfy; [`assemble`] turns all of it into a [`Request`], [`healthy_log`] reads logs.
+//! must satisfy.
 //!
 //! ```
 //! use std::path::Path;
@@ -25,14 +25,14 @@
 //! assert_eq!(loaded.request.plant.modes.len(), 1);
 //! ```
 
-pub mod assemble;
+mod assemble;
 pub mod check;
 pub mod defaults;
 mod error;
 mod estimator;
 mod event;
 mod experiment;
-pub mod healthy_log;
+mod healthy_log;
 mod notes;
 mod plant;
 pub mod schema;
@@ -72,7 +72,6 @@ pub struct Loaded {
 pub fn read(path: &Path) -> Result<Loaded, Error> {
     let folder = path.parent().unwrap_or(Path::new(""));
     load(path)
-        .map_err(Error::of_file)
         .and_then(|text| parse(&text, folder))
         .map_err(|error| error.in_file(path))
 }
@@ -115,30 +114,32 @@ pub fn noise_is_unknown(file: &DesignFile) -> bool {
 /// The text of a design file.
 ///
 /// # Errors
-/// The end of a sentence that begins with the file's name.
-pub fn load(path: &Path) -> Result<String, String> {
+/// A file that cannot be read, is larger than a design file, empty or not UTF-8.
+pub fn load(path: &Path) -> Result<String, Error> {
     let mut bytes = Vec::new();
     ftc_tables::open_regular(path, LARGEST_FILE)
         .map_err(|what| match path.is_dir() {
-            true => "this is a directory: name a design file (TOML) in it".into(),
-            false => what,
+            true => Error::of_file("this is a directory: name a design file (TOML) in it"),
+            false => Error::of_file(what.to_string()),
         })?
         .read_to_end(&mut bytes)
-        .map_err(|error| format!("cannot be read ({error}): check the path"))?;
+        .map_err(|error| Error::of_file(format!("cannot be read ({error}): check the path")))?;
     if bytes.len() as u64 > LARGEST_FILE {
-        return Err(format!(
+        return Err(Error::of_file(format!(
             "is larger than {} MB: put long tables into CSV files",
             LARGEST_FILE >> 20
-        ));
+        )));
     }
     let text = String::from_utf8(bytes).map_err(|error| {
-        format!(
+        Error::of_file(format!(
             "byte {} is not UTF-8: save the design file as UTF-8 text",
             error.utf8_error().valid_up_to() + 1
-        )
+        ))
     })?;
     if text.trim().is_empty() {
-        return Err("the file is empty: start from one of the files in examples/".into());
+        return Err(Error::of_file(
+            "the file is empty: start from one of the files in examples/",
+        ));
     }
     Ok(text)
 }

@@ -1,7 +1,7 @@
 //! The plant of a design file: its own matrices, those of a MATLAB or NumPy file, or a named model.
 
 use crate::assemble::{LARGEST_SIZE, at};
-use crate::check;
+use crate::check::{self, ValueError};
 use crate::notes::Notes;
 use crate::schema::{self, DesignFile, PlantModel};
 use crate::values::Matrix;
@@ -472,7 +472,7 @@ fn sound(name: &str, matrix: DMatrix<f64>) -> Result<DMatrix<f64>, String> {
             "{name}: the entry in row {}, column {} {}",
             entry % matrix.nrows() + 1,
             entry / matrix.nrows() + 1,
-            check::number(matrix[entry]).err().unwrap_or_default()
+            ValueError::Number(matrix[entry])
         )),
         None => Ok(matrix),
     }
@@ -527,12 +527,7 @@ fn linearised(model: &PlantModel, sample_time: f64) -> Result<SwitchedPlant, Str
             rectifier.loads.len()
         ));
     }
-    at(
-        "plant:",
-        rectifier
-            .linearise(sample_time)
-            .map_err(|error| error.to_string()),
-    )
+    at("plant:", rectifier.linearise(sample_time))
 }
 
 /// The sizes of a plant, or which matrix of which mode does not fit.

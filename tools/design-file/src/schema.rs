@@ -391,7 +391,7 @@ pub struct Told {
     /// Seconds.
     pub from: f64,
     /// Seconds.
-    #[serde(default = "crate::signal::for_ever")]
+    #[serde(default = "crate::signal::endless")]
     pub until: f64,
     /// The mode.
     pub mode: Which,
@@ -410,7 +410,7 @@ pub struct Load {
     /// Seconds.
     pub from: f64,
     /// Seconds.
-    #[serde(default = "crate::signal::for_ever")]
+    #[serde(default = "crate::signal::endless")]
     pub until: f64,
     /// What is added.
     pub size: f64,

@@ -98,7 +98,7 @@ pub struct Tables<'a> {
 }
 
 /// An end that never comes.
-pub(crate) fn for_ever() -> f64 {
+pub(crate) fn endless() -> f64 {
     f64::MAX
 }
 
@@ -130,7 +130,7 @@ impl Signal {
     ///
     /// # Errors
     /// One sentence, to be put after the signal's key.
-    pub fn waveform(&self, tables: Tables) -> Result<Waveform, String> {
+    pub(crate) fn waveform(&self, tables: Tables) -> Result<Waveform, String> {
         match &self.0 {
             Given::Number(value) => Ok(Waveform::Constant {
                 value: finite("value", *value)?,
@@ -188,7 +188,7 @@ impl SignalTable {
             },
             Kind::Ramp => {
                 let from = self.from.unwrap_or(0.0);
-                let until = self.until.unwrap_or_else(for_ever);
+                let until = self.until.unwrap_or_else(endless);
                 interval(from, until)?;
                 Waveform::Ramp {
                     value: or_zero("value", self.value)?,
@@ -289,13 +289,13 @@ impl Tables<'_> {
         column: &str,
         time: Option<&str>,
         interpolation: Interpolation,
-    ) -> Result<Vec<f64>, String> {
+    ) -> Result<Vec<f64>, Box<dyn std::error::Error>> {
         let mut table = Table::open(path)?;
         let names = table.names();
         let Some(at) = names.iter().position(|name| name == column) else {
             let known: Vec<&str> = names.iter().map(String::as_str).collect();
             let nearest = super::suggest::nearest(column, &known);
-            return Err(format!("has no column {column}: {nearest}"));
+            return Err(format!("has no column {column}: {nearest}").into());
         };
         let mut clock = find_time_column(names, time, &[at])?.map(Clock::new);
         let mut values = Vec::new();

@@ -1,7 +1,7 @@
 //! What the user may have meant.
 
 /// Below this similarity (0 to 1) a guess is worse than the list of what is known.
-const ALIKE: f64 = 0.7;
+const SIMILAR: f64 = 0.7;
 
 /// Names the known word nearest to `word`, or lists the known ones if none is near.
 pub fn nearest(word: &str, known: &[&str]) -> String {
@@ -11,7 +11,7 @@ pub fn nearest(word: &str, known: &[&str]) -> String {
         .iter()
         .max_by(|a, b| similarity(a).total_cmp(&similarity(b)));
     match best {
-        Some(best) if similarity(best) >= ALIKE => format!("did you mean {best}?"),
+        Some(best) if similarity(best) >= SIMILAR => format!("did you mean {best}?"),
         _ => format!("use one of {}", known.join(", ")),
     }
 }

@@ -1,6 +1,7 @@
 //! Values that may be written in more than one way.
 
-use crate::{check, sentence, suggest};
+use crate::check::{self, ValueError};
+use crate::{sentence, suggest};
 use serde::de::{Deserialize, Deserializer, Error, SeqAccess, Visitor};
 use std::fmt;
 
@@ -14,15 +15,18 @@ pub enum NumberOrList {
 }
 
 impl NumberOrList {
-    /// One value per channel; says what is wrong with the count.
-    pub fn spread(&self, channels: usize) -> Result<Vec<f64>, String> {
+    /// One value per channel.
+    ///
+    /// # Errors
+    /// A list with another length.
+    pub fn spread(&self, channels: usize) -> Result<Vec<f64>, ValueError> {
         match self {
             Self::Number(value) => Ok(vec![*value; channels]),
             Self::List(values) if values.len() == channels => Ok(values.clone()),
-            Self::List(values) => Err(format!(
-                "has {} entries: give one number, or a list of {channels}",
-                values.len()
-            )),
+            Self::List(values) => Err(ValueError::Entries {
+                found: values.len(),
+                needed: channels,
+            }),
         }
     }
 }
@@ -66,25 +70,28 @@ impl Which {
     /// Its index from 0 among things of these names.
     ///
     /// # Errors
-    /// One sentence that begins with `what`; `things` is what they are called.
-    pub fn index(&self, what: &str, names: &[&str], things: &str) -> Result<usize, String> {
+    /// A number or name of nothing, or a name of more than one; the sentence begins with `key`, and
+    /// `things` is what they are called.
+    pub fn index(&self, key: &str, names: &[&str], things: &str) -> Result<usize, ValueError> {
         let name = match self {
-            Self::Number(number) => return check::index(what, *number, names.len(), things),
+            Self::Number(number) => return check::index(key, *number, names.len(), things),
             Self::Name(name) => name,
         };
         let mut places = (0..names.len()).filter(|&at| names[at] == name);
         match (places.next(), places.next()) {
             (Some(at), None) => Ok(at),
-            (Some(_), Some(_)) => Err(format!(
-                "{what} is \"{}\", the name of several {things}: give the number, from 1 to {}",
-                sentence::shorten(name),
-                names.len()
-            )),
-            (None, _) => Err(format!(
-                "{what} is \"{}\", the name of none of the {things}: {}",
-                sentence::shorten(name),
-                suggest::nearest(name, names)
-            )),
+            (Some(_), Some(_)) => Err(ValueError::SharedName {
+                key: key.to_string(),
+                name: name.clone(),
+                things: things.to_string(),
+                total: names.len(),
+            }),
+            (None, _) => Err(ValueError::NoSuchName {
+                key: key.to_string(),
+                name: name.clone(),
+                things: things.to_string(),
+                advice: suggest::nearest(name, names),
+            }),
         }
     }
 }
@@ -124,6 +131,16 @@ pub enum NameOrList {
     Name(String),
     /// One each.
     List(Vec<String>),
+}
+
+impl NameOrList {
+    /// The name for a mode (0-based); empty where the list is too short.
+    pub fn of_mode(&self, mode: usize) -> &str {
+        match self {
+            Self::Name(name) => name,
+            Self::List(names) => names.get(mode).map_or("", String::as_str),
+        }
+    }
 }
 
 impl<'de> Deserialize<'de> for NameOrList {

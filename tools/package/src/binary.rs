@@ -51,6 +51,11 @@ impl Runner {
     /// # Errors
     /// The command cannot be started, or the binary brought it down.
     pub(crate) fn run(&self, fmu: &Path) -> Result<Ran, Refusal> {
+        self.run_within(fmu, LONGEST)
+    }
+
+    /// The same, given so much time.
+    fn run_within(&self, fmu: &Path, longest: Duration) -> Result<Ran, Refusal> {
         let [program, arguments @ ..] = self.0.as_slice() else {
             return Ok(Ran::NotRun("no program is named to run it".into()));
         };
@@ -71,9 +76,13 @@ impl Runner {
         };
         let begin = Instant::now();
         while matches!(child.try_wait(), Ok(None)) {
-            if begin.elapsed() > LONGEST {
+            if begin.elapsed() > longest {
                 let _ = child.kill();
-                break;
+                let _ = child.wait();
+                return Err(Refusal::Unproved(format!(
+                    "the binary for {HOST} has not come to its end after {} s: export it again",
+                    longest.as_secs_f64()
+                )));
             }
             std::thread::sleep(Duration::from_millis(5));
         }
@@ -383,4 +392,46 @@ fn beside(slave: &Slave, design: &Design) -> Result<(), String> {
         }
     }
     Ok(())
+}
+
+#[cfg(all(test, unix))]
+mod tests {
+    use super::*;
+
+    fn run(script: &str) -> (Result<Ran, Refusal>, Duration) {
+        let command = ["sh", "-c", script].map(OsString::from);
+        let begin = Instant::now();
+        let longest = Duration::from_millis(500);
+        let ran = Runner(command.to_vec()).run_within(Path::new("x.fmu"), longest);
+        (ran, begin.elapsed())
+    }
+
+    fn refusal(ran: Result<Ran, Refusal>) -> String {
+        match ran {
+            Err(Refusal::Unproved(what)) => what,
+            _ => panic!("accepted, or refused for another reason"),
+        }
+    }
+
+    #[test]
+    fn a_binary_that_hangs_is_stopped() {
+        let (ran, took) = run("exec sleep 600");
+        assert!(took < Duration::from_secs(60), "{took:?}");
+        let said = refusal(ran);
+        assert!(
+            said.contains("has not come to its end after 0.5 s"),
+            "{said}"
+        );
+    }
+
+    #[test]
+    fn a_binary_that_crashes_is_told_from_one_that_answers() {
+        let said = refusal(run("kill -SEGV $$").0);
+        assert!(
+            said.contains("does not run to its end (signal: 11"),
+            "{said}"
+        );
+        let (ran, _) = run(r#"echo '{"agrees": 300}'"#);
+        assert!(ran.is_ok_and(|ran| ran == Ran::Agrees(300)));
+    }
 }

@@ -12,6 +12,18 @@ const FORMAT: u32 = 3;
 /// Identifier under which the design's fingerprint is taken.
 const IDENTIFIER: &str = "certificate";
 
+/// A certificate that is not that of the design beside which it lies.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
+pub enum CertificateError {
+    /// Written by another version.
+    #[error("{PATH} is of another layout: export the design again")]
+    Format,
+    /// The fingerprint is that of another design.
+    #[error("{PATH} belongs to another design: export the design again")]
+    Foreign,
+}
+
 /// The certificate of the design beside which it lies. Plant, gains and observer stand in the design alone.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -37,15 +49,14 @@ impl Certificate {
     /// The proof, if this is the certificate of a design whose record has these bytes.
     ///
     /// # Errors
-    /// One sentence that says why it is not.
-    pub fn proof_of(self, resource: &[u8]) -> Result<Proof, String> {
-        let what = if self.format != FORMAT {
-            "is of another layout"
+    /// Why it is not.
+    pub fn proof_of(self, resource: &[u8]) -> Result<Proof, CertificateError> {
+        if self.format != FORMAT {
+            Err(CertificateError::Format)
         } else if self.design != model_description::guid(IDENTIFIER, resource) {
-            "belongs to another design"
+            Err(CertificateError::Foreign)
         } else {
-            return Ok(self.proof);
-        };
-        Err(format!("{PATH} {what}: export the design again"))
+            Ok(self.proof)
+        }
     }
 }

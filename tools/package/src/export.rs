@@ -140,8 +140,8 @@ pub fn export(design: &Design, options: &Options) -> Result<Exported, Error> {
         file: file.into(),
         what,
     };
-    let resource =
-        model_description::write_design(design).map_err(|what| unwritten(RESOURCE, what))?;
+    let resource = model_description::write_design(design)
+        .map_err(|error| unwritten(RESOURCE, error.to_string()))?;
     let exporter = Exporter {
         design,
         certificate: serde_json::to_vec_pretty(&Certificate::new(proof, &resource))

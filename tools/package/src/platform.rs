@@ -2,6 +2,21 @@
 
 use object::{Architecture, BinaryFormat, Object};
 
+/// Why bytes are no library of an FMU: the end of a sentence that begins with the library's path.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
+pub enum LibraryError {
+    /// Another format, or for another processor.
+    #[error("is no library for {0}")]
+    Platform(&'static str),
+    /// Its table of functions cannot be read.
+    #[error("cannot be read ({0})")]
+    Unreadable(String),
+    /// A function of the interface is missing.
+    #[error("offers no function {0}")]
+    Function(&'static str),
+}
+
 /// A platform for which binaries may have been built.
 pub struct Platform {
     /// Directory inside the FMU and beside this program.
@@ -61,18 +76,18 @@ impl Platform {
     /// What its machine code does is not looked at.
     ///
     /// # Errors
-    /// The end of a sentence that begins with the library's path.
-    pub fn check(&self, bytes: &[u8]) -> Result<(), String> {
+    /// Why they are not.
+    pub fn check(&self, bytes: &[u8]) -> Result<(), LibraryError> {
         let file = object::File::parse(bytes)
             .ok()
             .filter(|file| file.format() == self.format && file.architecture() == self.architecture)
-            .ok_or_else(|| format!("is no library for {}", self.name))?;
+            .ok_or(LibraryError::Platform(self.name))?;
         let exports = file
             .exports()
-            .map_err(|error| format!("cannot be read ({error})"))?;
+            .map_err(|error| LibraryError::Unreadable(error.to_string()))?;
         let offers = |name: &&str| exports.iter().any(|found| found.name() == name.as_bytes());
         match NEEDED.iter().find(|name| !offers(name)) {
-            Some(name) => Err(format!("offers no function {name}")),
+            Some(name) => Err(LibraryError::Function(name)),
             None => Ok(()),
         }
     }

@@ -29,7 +29,7 @@ const END_SIGNATURE: &[u8] = b"PK\x05\x06";
 /// # Errors
 /// One sentence: not a regular file, no archive, damaged, too large, or with an entry that is no
 /// regular file, stands twice, leads out of the archive, bears two names or is not `known`.
-pub fn files(
+pub(crate) fn files(
     path: &Path,
     known: impl Fn(&str) -> bool,
 ) -> Result<BTreeMap<String, Vec<u8>>, String> {

@@ -155,7 +155,9 @@ impl Fmu {
         let bytes = self.resource()?;
         let (kind, mut design) = self.design()?;
         let shipped: Certificate = parse(certificate::PATH, self.file(certificate::PATH)?)?;
-        let proof = shipped.proof_of(bytes).map_err(Unproved)?;
+        let proof = shipped
+            .proof_of(bytes)
+            .map_err(|error| Unproved(error.to_string()))?;
         design.proof = Some(proof.clone());
         ftc_design::coverage::prove(&design).map_err(|error| Unproved(error.to_string()))?;
         self.check_description(kind, &design, bytes)?;

@@ -30,9 +30,7 @@ pub struct Design(Arc<Made>);
 #[pyfunction]
 pub fn read_text(py: Python<'_>, path: PathBuf) -> PyResult<String> {
     let called = path.display().to_string();
-    design_file::load(&path).map_err(|what| {
-        errors::of_input(py, design_file::Error::of_file(what), Author::User(&called))
-    })
+    design_file::load(&path).map_err(|error| errors::of_input(py, error, Author::User(&called)))
 }
 
 /// Designs what a text asks for; logs and tables are sought in `folder`. `called` is the name of

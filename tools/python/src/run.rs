@@ -5,7 +5,7 @@ use ftc_simulate::Trajectory;
 use ftc_simulate::closed_loop::Record;
 use pyo3::prelude::*;
 use pyo3::types::PyBytes;
-use report::simulate::Simulation;
+use report::simulate::{SimulateError, Simulation};
 
 /// A signal of one sample.
 type Reading = fn(&Record) -> &[f64];
@@ -45,8 +45,12 @@ impl Run {
     /// Simulates a design's scenario.
     ///
     /// # Errors
-    /// One sentence about a baseline.
-    pub fn of(design: &Design, warnings: Vec<String>, baselines: bool) -> Result<Self, String> {
+    /// A baseline that cannot be made for this design.
+    pub fn of(
+        design: &Design,
+        warnings: Vec<String>,
+        baselines: bool,
+    ) -> Result<Self, SimulateError> {
         Ok(Self {
             simulation: report::simulate::simulate(design, warnings, baselines)?,
             sample_time: design.plant.sample_time,

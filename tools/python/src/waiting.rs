@@ -7,7 +7,7 @@ use std::thread;
 use std::time::{Duration, Instant};
 
 /// How often Ctrl-C is looked for.
-const PATIENCE: Duration = Duration::from_millis(50);
+const POLL_INTERVAL: Duration = Duration::from_millis(50);
 /// How often progress is told.
 const BETWEEN_REPORTS: Duration = Duration::from_secs(1);
 /// Stack of the worker: that of a main thread.
@@ -35,7 +35,7 @@ pub fn wait<T: Send + 'static>(
     loop {
         let came;
         (receive, came) = py.detach(move || {
-            let came = receive.recv_timeout(PATIENCE);
+            let came = receive.recv_timeout(POLL_INTERVAL);
             (receive, came)
         });
         match came {

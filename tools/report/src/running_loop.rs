@@ -23,10 +23,16 @@ pub fn gains(design: &Design, proof: &Proof) -> Lines {
         lines.push((
             format!("mode {}", mode + 1),
             format!(
-                "{gamma}, noise gain {}, gain of an unnoticed fault {}, noise on the command {}",
+                "{gamma}, noise gain {}, gain of an unnoticed fault {}, {}",
                 short(running.noise_gain[mode]),
                 short(running.fault_gain[mode]),
-                with_units(&running.command_noise[mode], inputs)
+                match proof.observer.spec.noise.is_empty() {
+                    true => "noise on the command not known without scenario.noise".into(),
+                    false => format!(
+                        "noise on the command {}",
+                        with_units(&running.command_noise[mode], inputs)
+                    ),
+                }
             ),
         ));
     }
@@ -107,7 +113,7 @@ fn shortest_mode(proof: &Proof, transfer: &TransferCertificate) -> usize {
 
 /// The sentence an engineer wants first: "Survives the loss of level 1; survives both by the model
 /// alone; does not survive angle".
-pub fn survival(design: &Design, proof: &Proof) -> String {
+pub fn lost_sensors(design: &Design, proof: &Proof) -> String {
     let table = &proof.running_loop.lost;
     let outputs = &design.signals.outputs;
     let all = |entry: &&LostSensors| entry.sensors.len() == outputs.len();

@@ -5,7 +5,7 @@ use crate::table::{Table, number};
 use crate::warnings;
 use ftc_control::Controller;
 use ftc_design::Design;
-use ftc_simulate::baselines::comparison;
+use ftc_simulate::baselines::comparison::{self, BaselineError};
 use ftc_simulate::closed_loop::{Merits, Record};
 use ftc_simulate::{PlantSimulator, Trajectory, Variant, run};
 use serde_json::{Map, Value, json};
@@ -45,36 +45,55 @@ pub fn memory(design: &Design, baselines: bool) -> u64 {
 }
 
 /// Refuses a run that would keep more than a usual machine has.
-fn check_memory(design: &Design, baselines: bool) -> Result<(), String> {
+fn check_memory(design: &Design, baselines: bool) -> Result<(), SimulateError> {
     let (bytes, steps) = (memory(design, baselines), design.scenario.steps);
     if bytes <= MOST_BYTES {
         return Ok(());
     }
     let share = MOST_BYTES as f64 / bytes as f64;
-    Err(format!(
-        "scenario.steps is {steps}: simulate keeps every sample, which would take about {} GB of memory: give at most {}",
-        bytes >> 30,
-        (share * steps as f64) as u64
-    ))
+    Err(SimulateError::TooLong {
+        steps,
+        gigabytes: bytes >> 30,
+        most: (share * steps as f64) as u64,
+    })
+}
+
+/// Why a simulation leaves no files.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum SimulateError {
+    /// There is no such baseline for this design.
+    #[error(transparent)]
+    Baseline(#[from] BaselineError),
+    /// The samples would take more memory than a usual machine has.
+    #[error(
+        "scenario.steps is {steps}: simulate keeps every sample, which would take about {gigabytes} GB of memory: give at most {most}"
+    )]
+    TooLong {
+        /// Samples asked for.
+        steps: u64,
+        /// What they would take.
+        gigabytes: u64,
+        /// Samples that would fit.
+        most: u64,
+    },
 }
 
 /// Runs the scenario in every variant, and with every baseline if asked for:
 /// `metrics.json`, `robustness.json` and the report. `warnings` are those of the design.
 ///
 /// # Errors
-/// One sentence about a baseline, or about the length of the scenario.
+/// A baseline that cannot be made for this design, or a scenario too long to be kept.
 pub fn simulate(
     design: &Design,
     mut warnings: Vec<String>,
     baselines: bool,
-) -> Result<Simulation, String> {
+) -> Result<Simulation, SimulateError> {
     check_memory(design, baselines)?;
     let mut trajectories = trajectories(design);
     let mut bound = None;
     if baselines {
-        trajectories.extend(
-            comparison::trajectories(design, &plant(design)).map_err(|error| error.to_string())?,
-        );
+        trajectories.extend(comparison::trajectories(design, &plant(design))?);
         bound = Some(comparison::bound(design, &trajectories[0]));
     }
     warnings.extend(warnings::of_runs(design, &trajectories));

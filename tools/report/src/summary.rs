@@ -59,11 +59,11 @@ fn overview(design: &Design) -> Vec<(String, String)> {
     let plant = &design.plant;
     let dims = plant.dimensions();
     let names: Vec<&str> = plant.modes.iter().map(|mode| mode.name.as_str()).collect();
-    let survival = design
+    let lost_sensors = design
         .proof
         .as_ref()
-        .map(|proof| line("lost sensors", running_loop::survival(design, proof)));
-    let mut lines: Vec<_> = survival.into_iter().collect();
+        .map(|proof| line("lost sensors", running_loop::lost_sensors(design, proof)));
+    let mut lines: Vec<_> = lost_sensors.into_iter().collect();
     lines.extend([
         line("name", &design.name),
         line("sample time", format!("{} s", plant.sample_time)),
@@ -313,7 +313,7 @@ pub fn json(design: &Design, warnings: &[String]) -> String {
         "bumpless_needs_dwell": running.and_then(|r| r.transfer.as_ref().map(TransferCertificate::needs_dwell)),
         "noise_gain": running.map(|r| r.noise_gain.clone()),
         "fault_gain": running.map(|r| r.fault_gain.clone()),
-        "command_noise": running.map(|r| r.command_noise.clone()),
+        "command_noise": synthesis.as_ref().filter(|s| !s.observer.spec.noise.is_empty()).map(|s| s.running_loop.command_noise.clone()),
         "disturbance": if assumes_input_disturbance(&design.plant) { "assumed at the inputs (B)" } else { "given (E, F)" },
         "lost_sensors": running.map(|r| running_loop::json(design, &r.lost)),
         "lost_sensors_minimum_dwell": design.controller.observer.minimum_dwell,

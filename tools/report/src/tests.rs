@@ -2,15 +2,15 @@
 
 use super::figure::{Figure, Mark, Series};
 use super::page::{Column, KeyNumber, Page, Row, Section, Table};
+use super::simulate::SimulateError;
 use super::{demo, svg};
 use ftc_control::parameters::{
     Compensation, Estimator, EstimatorMethod, FeedbackGains, Observer, ObserverKind, StateFeedback,
 };
 use ftc_control::{Controller, Matrix};
-use ftc_design::{ControllerDesign, Design, FORMAT, Signal, Signals};
+use ftc_design::{ControllerDesign, Design, Signal, Signals};
 use ftc_plant::scenario::{FaultEvent, FaultKind, ModeInterval, Waveform};
-use ftc_plant::{Mode, OperatingPoint, SwitchedPlant};
-use ftc_plant::{Scenario, TruePlant};
+use ftc_plant::{Mode, OperatingPoint, Scenario, SwitchedPlant};
 use ftc_simulate::{PlantSimulator, Trajectory, Variant, run};
 use nalgebra::DMatrix;
 use proptest::prelude::*;
@@ -25,11 +25,8 @@ const HOSTILE: &str = "<script>alert(1)</script> & \"y'\" ]]> \u{1}";
 fn signals(count: usize, symbol: &str, unit: Option<&str>) -> Vec<Signal> {
     (1..=count)
         .map(|index| Signal {
-            name: format!("{symbol}[{index}]"),
             unit: unit.map(String::from),
-            nominal: 1.0,
-            min: None,
-            max: None,
+            ..Signal::new(&format!("{symbol}[{index}]"))
         })
         .collect()
 }
@@ -37,21 +34,10 @@ fn signals(count: usize, symbol: &str, unit: Option<&str>) -> Vec<Signal> {
 /// The paper's example with the hand-made controller.
 fn paper(noise: f64) -> Design {
     let controller = common::controller_design(common::Channel::State, noise);
-    Design {
-        format: FORMAT,
-        name: "paper".into(),
-        signals: Signals {
-            inputs: signals(2, "u", None),
-            outputs: signals(2, "y", None),
-            states: signals(2, "x", None),
-            disturbances: Vec::new(),
-        },
-        plant: common::plant(common::Channel::State),
-        controller,
-        true_plant: TruePlant::default(),
-        proof: None,
-        scenario: common::scenario(common::reference("levels"), noise, 1),
-    }
+    let plant = common::plant(common::Channel::State);
+    let signals = Signals::numbered(plant.dimensions());
+    let scenario = common::scenario(common::reference("levels"), noise, 1);
+    Design::new("paper", plant, signals, controller, scenario)
 }
 
 /// A plant of first-order lags in any size, with a proportional-integral controller and no estimator.
@@ -80,88 +66,82 @@ fn lags(outputs: usize, disturbances: usize, steps: u64) -> Design {
         modes: vec![mode(0.5), mode(0.7)],
     };
     let at = |time: f64| time * steps as f64 * 0.01;
-    Design {
-        format: FORMAT,
-        name: "lags".into(),
-        signals: Signals {
-            inputs: signals(outputs, "u", Some("V")),
-            outputs: signals(outputs, "y", Some("A")),
-            states: signals(outputs, "x", None),
-            disturbances: Vec::new(),
+    let signals = Signals {
+        inputs: signals(outputs, "u", Some("V")),
+        outputs: signals(outputs, "y", Some("A")),
+        states: signals(outputs, "x", None),
+        disturbances: Vec::new(),
+    };
+    let controller = ControllerDesign {
+        feedback: StateFeedback {
+            tracked: (0..outputs).collect(),
+            latency: 0,
+            resonators: vec![],
+            transfer: None,
+            modes: vec![gains; 2],
         },
-        plant,
-        controller: ControllerDesign {
-            feedback: StateFeedback {
-                tracked: (0..outputs).collect(),
-                latency: 0,
-                resonators: vec![],
-                transfer: None,
-                modes: vec![gains; 2],
-            },
-            observer: Observer {
-                kind: ObserverKind::Luenberger,
-                note: Some("no disturbance to decouple".into()),
-                gains: vec![diagonal(0.4); 2],
-                decoupling: vec![vec![diagonal(0.0); 2]; 2],
-                lost: Vec::new(),
-                minimum_dwell: 0,
-            },
-            estimator: Estimator {
-                method: EstimatorMethod::None,
-                hypotheses: None,
-                response_length: 0,
-                window: 0,
-                predictors: vec![],
-                adapt: false,
-                harmonics: None,
-                harmonic_transfers: vec![],
-                thresholds: vec![0.1; outputs],
-                debounce: 1,
-                stuck_after: 0,
-                leverage_limit: 100.0,
-                largest_fault: vec![1e6; outputs],
-            },
-            compensation: Compensation::None,
+        observer: Observer {
+            kind: ObserverKind::Luenberger,
+            note: Some("no disturbance to decouple".into()),
+            gains: vec![diagonal(0.4); 2],
+            decoupling: vec![vec![diagonal(0.0); 2]; 2],
+            lost: Vec::new(),
+            minimum_dwell: 0,
         },
-        true_plant: TruePlant::default(),
-        proof: None,
-        scenario: Scenario {
-            steps,
-            noise: vec![0.02; outputs],
-            seed: 7,
-            schedule: vec![
-                ModeInterval { from: 0.0, mode: 0 },
-                ModeInterval {
-                    from: at(0.5),
-                    mode: 1,
-                },
-            ],
-            reference: vec![
-                Waveform::Square {
-                    amplitude: 1.0,
-                    period: at(0.4),
-                    offset: 0.0
-                };
-                outputs
-            ],
-            fault: vec![Waveform::ZERO; outputs],
-            events: vec![FaultEvent {
-                sensor: outputs - 1,
-                from: at(0.6),
-                until: at(0.8),
-                kind: FaultKind::Dropout,
-            }],
-            disturbance: vec![
-                Waveform::Sine {
-                    amplitude: 1.0,
-                    period: at(0.2),
-                    phase: 0.0,
-                    offset: 0.0
-                };
-                disturbances
-            ],
+        estimator: Estimator {
+            method: EstimatorMethod::None,
+            hypotheses: None,
+            response_length: 0,
+            window: 0,
+            predictors: vec![],
+            adapt: false,
+            harmonics: None,
+            harmonic_transfers: vec![],
+            thresholds: vec![0.1; outputs],
+            debounce: 1,
+            stuck_after: 0,
+            leverage_limit: 100.0,
+            largest_fault: vec![1e6; outputs],
         },
-    }
+        compensation: Compensation::None,
+    };
+    let scenario = Scenario {
+        steps,
+        noise: vec![0.02; outputs],
+        seed: 7,
+        schedule: vec![
+            ModeInterval { from: 0.0, mode: 0 },
+            ModeInterval {
+                from: at(0.5),
+                mode: 1,
+            },
+        ],
+        reference: vec![
+            Waveform::Square {
+                amplitude: 1.0,
+                period: at(0.4),
+                offset: 0.0
+            };
+            outputs
+        ],
+        fault: vec![Waveform::ZERO; outputs],
+        events: vec![FaultEvent {
+            sensor: outputs - 1,
+            from: at(0.6),
+            until: at(0.8),
+            kind: FaultKind::Dropout,
+        }],
+        disturbance: vec![
+            Waveform::Sine {
+                amplitude: 1.0,
+                period: at(0.2),
+                phase: 0.0,
+                offset: 0.0
+            };
+            disturbances
+        ],
+    };
+    Design::new("lags", plant, signals, controller, scenario)
 }
 
 fn hostile(mut design: Design) -> Design {
@@ -383,11 +363,13 @@ fn a_scenario_that_is_too_long_is_refused_with_an_estimate() {
     let mut design = paper(0.0);
     let one = crate::simulate::memory(&design, false) / design.scenario.steps;
     design.scenario.steps = 1_000_000_000;
-    let Err(what) = crate::simulate::simulate(&design, Vec::new(), false) else {
+    let refused = crate::simulate::simulate(&design, Vec::new(), false);
+    let Err(error @ SimulateError::TooLong { most, .. }) = refused else {
         panic!("it ran")
     };
+    let what = error.to_string();
     assert!(what.contains("scenario.steps is 1000000000"), "{what}");
-    let most: u64 = what.rsplit(' ').next().unwrap().parse().unwrap();
+    assert!(what.ends_with(&format!("at most {most}")), "{what}");
     assert!(most.abs_diff((8 << 30) / one) <= 1, "{what}");
     // A sample takes at least its numbers.
     let record = &simulate(&paper(0.0))[0].records[0];

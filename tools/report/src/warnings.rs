@@ -1,7 +1,6 @@
 //! The warnings of a design and of its runs, one sentence each.
 
-use crate::text::number;
-use design_file::healthy_log::file_of;
+use crate::text::{count, number};
 use design_file::schema::{DesignFile, ObserverKind};
 use design_file::sentence::shorten;
 use ftc_design::state_feedback::REJECTION;
@@ -161,6 +160,11 @@ fn of_warning(file: &DesignFile, design: &Design, warning: &Warning) -> String {
             "scenario.schedule: modes last {mean:.2} samples on average, but stability is proved only where they \
              last longer than {needed:.2}: let them last longer"
         ),
+        Warning::ModesTooShortForTransfer { shortest, needed } => format!(
+            "scenario.schedule: a mode lasts {} only, but with controller.bumpless stability is proved only where each \
+             lasts at least {needed}: let modes last longer, or leave bumpless out",
+            count(shortest as usize, "sample")
+        ),
         Warning::CostlyObserver {
             mode,
             running,
@@ -199,7 +203,7 @@ fn of_warning(file: &DesignFile, design: &Design, warning: &Warning) -> String {
             let database = file.estimator.database.as_ref();
             format!(
                 "{}: mode {} ({}), {}: {}",
-                shorten(database.map_or("", |files| file_of(files, mode))),
+                shorten(database.map_or("", |files| files.of_mode(mode))),
                 mode + 1,
                 design.plant.modes[mode].name,
                 design.signals.outputs[output].name,

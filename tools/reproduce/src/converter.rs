@@ -8,7 +8,7 @@ mod fairness;
 mod page;
 
 use super::experiment::{self, OutputMerits, design, merits};
-use super::{Findings, Progress};
+use super::{Error, Findings, Progress};
 use ftc_control::Controller;
 use ftc_design::Design;
 use ftc_plant::scenario::{FaultEvent, FaultKind};
@@ -145,14 +145,14 @@ impl Trial {
 }
 
 /// Runs everything.
-pub fn run(progress: Progress) -> Result<Findings, String> {
+pub fn run(progress: Progress) -> Result<Findings, Error> {
     progress("designing for the converter");
     let design = design(experiment::request(EXAMPLE)?)?;
     progress("running the converter under every fault");
     let trials: Vec<Trial> = cases()
         .into_iter()
         .map(|case| attempt(&design, case))
-        .collect::<Result<_, String>>()?;
+        .collect::<Result<_, Error>>()?;
     let runs: Vec<&Run> = trials.iter().flat_map(|trial| &trial.runs).collect();
     Ok(Findings {
         name: "converter",
@@ -164,7 +164,7 @@ pub fn run(progress: Progress) -> Result<Findings, String> {
 }
 
 /// Every controller under one fault.
-fn attempt(design: &Design, case: Case) -> Result<Trial, String> {
+fn attempt(design: &Design, case: Case) -> Result<Trial, Error> {
     let mut scenario = design.scenario.clone();
     scenario.events = case
         .fault
@@ -186,7 +186,7 @@ fn attempt(design: &Design, case: Case) -> Result<Trial, String> {
             Variant::Predictive => predict(design, &plant, HORIZON, INPUT_WEIGHT),
             _ => Ok(simulate(&plant, &controller, variant)),
         })
-        .collect::<Result<Vec<_>, String>>()?;
+        .collect::<Result<Vec<_>, Error>>()?;
     let runs = trajectories
         .iter()
         .map(|run| Run {
@@ -212,7 +212,7 @@ fn predict(
     plant: &PlantSimulator,
     horizon: usize,
     input_weight: f64,
-) -> Result<Trajectory, String> {
+) -> Result<Trajectory, Error> {
     let controller = &design.controller;
     let spec = PredictiveSpec {
         tracked: controller.feedback.tracked.clone(),
@@ -227,13 +227,12 @@ fn predict(
         horizon,
     };
     let mode = plant.initial_state().mode;
-    let mut predictive =
-        Predictive::new(&design.plant, &spec, mode).map_err(|error| error.to_string())?;
+    let mut predictive = Predictive::new(&design.plant, &spec, mode)?;
     Ok(run_with(plant, &mut predictive, Variant::Predictive, false))
 }
 
 /// One row per output and run.
-fn table(runs: &[&Run]) -> Result<Vec<u8>, String> {
+fn table(runs: &[&Run]) -> Result<Vec<u8>, Error> {
     let row = |run: &Run| {
         vec![
             run.fault.to_string(),

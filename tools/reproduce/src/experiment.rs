@@ -1,7 +1,8 @@
 //! What both experiments share: from an example to a design, from runs to numbers and curves.
 
+use crate::Error;
+use ftc_design::Design;
 use ftc_design::assembly::{Request, assemble};
-use ftc_design::{Design, DesignError};
 use ftc_simulate::Trajectory;
 use ftc_simulate::closed_loop::Record;
 use ftc_simulate::metrics::Merit;
@@ -11,15 +12,14 @@ use serde::Serialize;
 use std::path::Path;
 
 /// The request of a design file that is part of this program.
-pub fn request(text: &str) -> Result<Request, String> {
-    let loaded = design_file::parse(text, Path::new("")).map_err(|error| error.to_string())?;
-    Ok(loaded.request)
+pub fn request(text: &str) -> Result<Request, Error> {
+    Ok(design_file::parse(text, Path::new(""))?.request)
 }
 
-/// The design, or one sentence.
-pub fn design(request: Request) -> Result<Design, String> {
+/// The design.
+pub fn design(request: Request) -> Result<Design, Error> {
     let name = request.name.clone();
-    assemble(request).map_err(|error: DesignError| format!("{name}: {error}"))
+    assemble(request).map_err(|error| Error::Design { name, error })
 }
 
 /// Figures of merit of one output of one run, as written to JSON and CSV.
@@ -57,7 +57,7 @@ pub fn true_error(merits: &[OutputMerits]) -> f64 {
 pub fn table<'a>(
     names: &[&str],
     runs: impl Iterator<Item = (Vec<String>, &'a [OutputMerits])>,
-) -> Result<Vec<u8>, String> {
+) -> Result<Vec<u8>, Error> {
     let merits = [
         "output",
         "true_mse",
@@ -65,7 +65,7 @@ pub fn table<'a>(
         "measured_mse",
         "measured_vaf",
     ];
-    let mut table = Table::new(names.iter().chain(&merits)).map_err(|error| error.to_string())?;
+    let mut table = Table::new(names.iter().chain(&merits))?;
     for (names, outputs) in runs {
         for OutputMerits {
             output,
@@ -75,10 +75,10 @@ pub fn table<'a>(
         {
             let numbers = [truth.mse, truth.vaf, measured.mse, measured.vaf].map(number);
             let row = names.iter().chain([output]).chain(&numbers);
-            table.row(row).map_err(|error| error.to_string())?;
+            table.row(row)?;
         }
     }
-    table.finish().map_err(|error| error.to_string())
+    Ok(table.finish()?)
 }
 
 /// A signal of a run over time in seconds.

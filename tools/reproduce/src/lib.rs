@@ -7,6 +7,8 @@ mod converter;
 mod experiment;
 mod paper;
 
+use ftc_design::DesignError;
+use ftc_simulate::baselines::predictive::PredictiveError;
 use report::page::Page;
 use serde_json::Value;
 
@@ -44,11 +46,37 @@ pub struct Reproduction {
     pub summary: String,
 }
 
+/// Why an experiment was not run.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum Error {
+    /// The design file of an example.
+    #[error(transparent)]
+    Example(#[from] design_file::Error),
+    /// There is no such design, or none that can be certified.
+    #[error("{name}: {error}")]
+    Design {
+        /// Name of the design.
+        name: String,
+        /// Why not.
+        error: DesignError,
+    },
+    /// A printed theorem, or a variant of the design, that cannot be solved.
+    #[error(transparent)]
+    Theorem(#[from] DesignError),
+    /// The controller that is compared with.
+    #[error(transparent)]
+    Baseline(#[from] PredictiveError),
+    /// A table that cannot be written.
+    #[error(transparent)]
+    Table(#[from] csv::Error),
+}
+
 /// Runs an experiment.
 ///
 /// # Errors
-/// One sentence: a design that could not be made.
-pub fn run(experiment: Experiment, progress: Progress) -> Result<Reproduction, String> {
+/// A design that could not be made.
+pub fn run(experiment: Experiment, progress: Progress) -> Result<Reproduction, Error> {
     let findings = match experiment {
         Experiment::Paper => paper::run(progress)?,
         Experiment::Converter => converter::run(progress)?,

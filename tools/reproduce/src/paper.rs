@@ -6,7 +6,7 @@ mod printed;
 mod reachable;
 
 use super::experiment::{self, OutputMerits, design, merits, true_error};
-use super::{Findings, Progress};
+use super::{Error, Findings, Progress};
 use claims::Claims;
 use ftc_control::Controller;
 use ftc_control::ControllerParameters;
@@ -128,7 +128,7 @@ struct Designs {
 }
 
 impl Designs {
-    fn new(request: &Request) -> Result<Self, String> {
+    fn new(request: &Request) -> Result<Self, Error> {
         let mut additive = request.clone();
         additive.control.objective = Objective::Decay;
         additive.compensation = Compensation::Additive;
@@ -211,7 +211,7 @@ impl Shown {
 }
 
 /// Runs everything.
-pub fn run(progress: Progress) -> Result<Findings, String> {
+pub fn run(progress: Progress) -> Result<Findings, Error> {
     progress("running the paper's example in every variant");
     let mut record = Record {
         runs: Vec::new(),
@@ -241,7 +241,7 @@ pub fn run(progress: Progress) -> Result<Findings, String> {
 }
 
 impl Record {
-    fn add(&mut self, channel: &'static str, noise: f64, request: &Request) -> Result<(), String> {
+    fn add(&mut self, channel: &'static str, noise: f64, request: &Request) -> Result<(), Error> {
         let designs = Designs::new(request)?;
         for reference in REFERENCES {
             let signals = waveforms(reference, request);
@@ -319,7 +319,7 @@ impl Record {
 }
 
 /// One row per output and run.
-fn table(runs: &[Run]) -> Result<Vec<u8>, String> {
+fn table(runs: &[Run]) -> Result<Vec<u8>, Error> {
     let row = |run: &Run| {
         let controller = json!(run.controller);
         vec![

@@ -1,9 +1,10 @@
 //! Files that engineers have, or one sentence: delimited text with or without time stamps
 //! ([`Table`], [`Clock`]), and matrices in MATLAB and NumPy files ([`matrices`]).
 //!
-//! Only regular files of bounded size are read. Every error is the end of a sentence that begins
-//! with the file's name.
+//! Only regular files of bounded size are read. Every [`Error`] reads as the end of a sentence that
+//! begins with the file's name.
 
+mod error;
 pub mod matrices;
 mod regular;
 mod resample;
@@ -11,6 +12,7 @@ mod silent;
 mod table;
 mod time;
 
+pub use error::{EntryError, Error, MatrixError, TimeColumnError, TimeError};
 pub use regular::open_regular;
 pub use resample::{Interpolation, resample};
 pub use table::{MOST_ROWS, Place, Row, Table};

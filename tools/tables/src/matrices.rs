@@ -7,7 +7,7 @@ mod hdf5;
 mod level5;
 
 use crate::silent::caught;
-use crate::{open_regular, quote};
+use crate::{EntryError, Error, MatrixError, open_regular, quote};
 use nalgebra::DMatrix;
 use std::collections::BTreeMap;
 use std::io::Read;
@@ -21,7 +21,7 @@ const MOST_ENTRIES: usize = 1 << 20;
 const DEEPEST: usize = 8;
 
 /// What a file holds under a name: a matrix, or why it is none.
-type Found = BTreeMap<String, Result<DMatrix<f64>, String>>;
+type Found = BTreeMap<String, Result<DMatrix<f64>, EntryError>>;
 
 /// The matrices of one file.
 #[derive(Clone, Debug)]
@@ -33,23 +33,23 @@ impl Matrices {
     /// Reads a `.mat` or `.npz` file; which one it is, is told by its first bytes.
     ///
     /// # Errors
-    /// The end of a sentence that begins with the file's name.
-    pub fn read(path: &Path) -> Result<Self, String> {
+    /// A file that cannot be read, has no format that is known, or holds no matrix.
+    pub fn read(path: &Path) -> Result<Self, Error> {
         let mut bytes = Vec::new();
         open_regular(path, MOST_BYTES)?
             .read_to_end(&mut bytes)
-            .map_err(|error| format!("cannot be read ({error}): check the file"))?;
+            .map_err(|error| Error::unreadable(&error))?;
         if bytes.len() as u64 > MOST_BYTES {
-            return Err(format!(
-                "has more than {} MB: keep to the matrices of the model",
-                MOST_BYTES >> 20
-            ));
+            return Err(Error::TooLarge {
+                megabytes: MOST_BYTES >> 20,
+                growing: true,
+                advice: "keep to the matrices of the model",
+            });
         }
         // The readers of damaged files are not proof against every length that a file may claim.
-        let found =
-            caught(|| parse(bytes)).unwrap_or_else(|| Err("is damaged: save it again".into()))?;
+        let found = caught(|| parse(bytes)).unwrap_or_else(|| Err(MatrixError::Damaged.into()))?;
         if found.is_empty() {
-            return Err("holds no matrix: save A, B and C into it".into());
+            return Err(MatrixError::Empty.into());
         }
         Ok(Self { found })
     }
@@ -67,24 +67,23 @@ impl Matrices {
     /// The matrix of this name (rows and columns as the user sees them).
     ///
     /// # Errors
-    /// The end of a sentence that begins with the file's name.
-    pub fn matrix(&self, name: &str) -> Result<DMatrix<f64>, String> {
+    /// No variable of this name, or one that is no real matrix.
+    pub fn matrix(&self, name: &str) -> Result<DMatrix<f64>, MatrixError> {
         match self.found.get(name) {
             Some(Ok(matrix)) => Ok(matrix.clone()),
-            Some(Err(what)) => Err(format!("{name} {what}")),
-            None => {
-                let names: Vec<&str> = self.names().collect();
-                Err(format!(
-                    "has no variable {}: name one of {}",
-                    quote(name),
-                    names.join(", ")
-                ))
-            }
+            Some(Err(why)) => Err(MatrixError::Variable {
+                name: name.to_string(),
+                why: why.clone(),
+            }),
+            None => Err(MatrixError::Missing {
+                name: quote(name),
+                names: self.names().map(str::to_string).collect(),
+            }),
         }
     }
 }
 
-fn parse(bytes: Vec<u8>) -> Result<Found, String> {
+fn parse(bytes: Vec<u8>) -> Result<Found, Error> {
     if bytes.starts_with(b"PK") {
         return archive::read(bytes);
     }
@@ -95,13 +94,9 @@ fn parse(bytes: Vec<u8>) -> Result<Found, String> {
         return level5::read(&bytes);
     }
     if bytes.starts_with(b"\x93NUMPY") {
-        return Err("is a single NumPy array: save A, B and C together with numpy.savez".into());
+        return Err(MatrixError::SingleArray.into());
     }
-    Err(
-        "is neither a MATLAB file (level 5 or 7.3) nor a NumPy archive (.npz): \
-         save it with save(...) in MATLAB, scipy.io.savemat or numpy.savez"
-            .into(),
-    )
+    Err(MatrixError::Format.into())
 }
 
 /// The byte order mark that ends the header of a level 5 file.
@@ -110,32 +105,23 @@ fn is_level5_mark(mark: &[u8]) -> bool {
 }
 
 /// A matrix from its entries column by column, if it is one.
-fn from_columns(shape: &[usize], entries: &[f64]) -> Result<DMatrix<f64>, String> {
+fn from_columns(shape: &[usize], entries: &[f64]) -> Result<DMatrix<f64>, EntryError> {
     check_shape(shape)?;
     match *shape {
         [rows, columns] if rows * columns == entries.len() => {
             Ok(DMatrix::from_column_slice(rows, columns, entries))
         }
-        _ => Err("is damaged: save it again".into()),
+        _ => Err(EntryError::Damaged),
     }
 }
 
 /// Says why an array of this shape is no matrix.
-fn check_shape(shape: &[usize]) -> Result<(), String> {
-    let sizes: Vec<String> = shape.iter().map(ToString::to_string).collect();
-    let sizes = sizes.join(" x ");
+fn check_shape(shape: &[usize]) -> Result<(), EntryError> {
     let entries = shape.iter().try_fold(1usize, |all, &n| all.checked_mul(n));
     match shape.len() {
         2 if entries.is_some_and(|n| n <= MOST_ENTRIES) => Ok(()),
-        2 => Err(format!(
-            "has {sizes} entries, more than a model has: name another variable"
-        )),
-        0 | 1 => Err(format!(
-            "has one dimension ({sizes} entries): save it with two, as a row or a column"
-        )),
-        _ => Err(format!(
-            "has {} dimensions ({sizes}): save one matrix per mode",
-            shape.len()
-        )),
+        2 => Err(EntryError::TooLarge(shape.to_vec())),
+        0 | 1 => Err(EntryError::OneDimension(shape.to_vec())),
+        _ => Err(EntryError::Dimensions(shape.to_vec())),
     }
 }

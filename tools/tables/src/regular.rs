@@ -1,5 +1,6 @@
-//! Opening files: regular ones only, and never more bytes than were bargained for.
+//! Opening files: regular ones only, and never more bytes than are allowed.
 
+use crate::Error;
 use std::fs::{self, File};
 use std::io::{Read, Take};
 use std::path::Path;
@@ -8,28 +9,29 @@ use std::path::Path;
 /// since opening one may wait for ever; the reader ends after `most + 1` bytes whatever the file does.
 ///
 /// # Errors
-/// The end of a sentence that begins with the file's name.
-pub fn open_regular(path: &Path, most: u64) -> Result<Take<File>, String> {
-    let blame = |error: std::io::Error| {
-        format!("cannot be opened ({error}): check the path and its permissions")
+/// A file that cannot be opened, is no regular file, or is larger.
+pub fn open_regular(path: &Path, most: u64) -> Result<Take<File>, Error> {
+    let unopened = |error: std::io::Error| Error::Unopened {
+        why: error.to_string(),
     };
-    let kind = fs::metadata(path).map_err(blame)?;
+    let kind = fs::metadata(path).map_err(unopened)?;
     if kind.is_dir() {
-        return Err("is a directory: name a file in it".into());
+        return Err(Error::Directory);
     }
     if !kind.is_file() {
-        return Err("is no regular file: save what it gives to a file and name that".into());
+        return Err(Error::NotRegular);
     }
-    let file = File::open(path).map_err(blame)?;
-    let opened = file.metadata().map_err(blame)?;
+    let file = File::open(path).map_err(unopened)?;
+    let opened = file.metadata().map_err(unopened)?;
     if !opened.is_file() {
-        return Err("is no regular file: save what it gives to a file and name that".into());
+        return Err(Error::NotRegular);
     }
     if opened.len() > most {
-        return Err(format!(
-            "is larger than {} MB: shorten it, or name another file",
-            most >> 20
-        ));
+        return Err(Error::TooLarge {
+            megabytes: most >> 20,
+            growing: false,
+            advice: "shorten it, or name another file",
+        });
     }
     Ok(file.take(most + 1))
 }

@@ -4,7 +4,7 @@
 //! first rows, or said by a first line `sep=;`. A decimal comma is understood where commas do not
 //! separate columns. UTF-8 with or without byte order mark, UTF-16 with one; any line end; quotes.
 
-use crate::{open_regular, quote};
+use crate::{Error, open_regular, quote};
 use csv::{Reader, ReaderBuilder, StringRecord, Trim};
 use encoding_rs_io::{DecodeReaderBytes, DecodeReaderBytesBuilder};
 use std::fs::File;
@@ -73,8 +73,8 @@ impl Table {
     /// Opens a table and reads its header.
     ///
     /// # Errors
-    /// The end of a sentence that begins with the file's name.
-    pub fn open(path: &Path) -> Result<Self, String> {
+    /// A file that cannot be read, or is no text.
+    pub fn open(path: &Path) -> Result<Self, Error> {
         let file = open_regular(path, MOST_BYTES)?;
         let mut text = DecodeReaderBytesBuilder::new()
             .utf8_passthru(true)
@@ -84,7 +84,7 @@ impl Table {
         (&mut text)
             .take(HEAD)
             .read_to_end(&mut head)
-            .map_err(|error| format!("cannot be read ({error}): check the file"))?;
+            .map_err(|error| Error::unreadable(&error))?;
         refuse_binary(&head)?;
         let (said, start) = said_delimiter(&head);
         let delimiter = said.unwrap_or_else(|| likely_delimiter(&head[start..]));
@@ -119,8 +119,8 @@ impl Table {
     /// The next row; none after the last. Rows of empty cells at the end are no rows.
     ///
     /// # Errors
-    /// The end of a sentence that begins with the file's name.
-    pub fn next_row(&mut self) -> Result<Option<Row>, String> {
+    /// A row that is no text, does not fit the header, or is one too many.
+    pub fn next_row(&mut self) -> Result<Option<Row>, Error> {
         let Some(row) = self.next_record()? else {
             return Ok(None);
         };
@@ -129,16 +129,16 @@ impl Table {
         }
         while let Some(later) = self.next_record()? {
             if !later.is_empty() {
-                return Err(format!(
-                    "line {} is empty, but more follows in line {}: fill the gap, or delete what follows",
-                    row.place.line, later.place.line
-                ));
+                return Err(Error::EmptyLine {
+                    line: row.place.line,
+                    next: later.place.line,
+                });
             }
         }
         Ok(None)
     }
 
-    fn next_record(&mut self) -> Result<Option<Row>, String> {
+    fn next_record(&mut self) -> Result<Option<Row>, Error> {
         let mut cells = StringRecord::new();
         let more = self.reader.read_record(&mut cells);
         if !more.map_err(|error| damaged(&error, self.skipped))? {
@@ -147,7 +147,7 @@ impl Table {
         let line = cells.position().map_or(0, csv::Position::line) + self.skipped;
         let row = self.rows + 1;
         if self.rows == MOST_ROWS && cells.iter().any(|cell| !cell.is_empty()) {
-            return Err(format!("has more than {MOST_ROWS} rows: shorten it"));
+            return Err(Error::TooManyRows);
         }
         self.rows = row;
         let place = Place { row, line };
@@ -155,33 +155,35 @@ impl Table {
     }
 
     /// A row has a cell for each column; what spreadsheets add behind the last is empty.
-    fn whole(&self, row: Row) -> Result<Row, String> {
-        let (found, wanted) = (row.cells.len(), self.names.len());
-        let surplus = row.cells.iter().skip(wanted).any(|cell| !cell.is_empty());
-        if found >= wanted && !surplus {
+    fn whole(&self, row: Row) -> Result<Row, Error> {
+        let (found, needed) = (row.cells.len(), self.names.len());
+        let surplus = row.cells.iter().skip(needed).any(|cell| !cell.is_empty());
+        if found >= needed && !surplus {
             return Ok(row);
         }
-        let advice = if self.delimiter == b',' && found == 2 * wanted {
+        let advice = if self.delimiter == b',' && found == 2 * needed {
             "separate columns by semicolons where numbers have decimal commas"
         } else {
             "give every row a cell for each column"
         };
-        Err(format!(
-            "line {} has {found} cells, but the header has {wanted}: {advice}",
-            row.place.line
-        ))
+        Err(Error::Cells {
+            line: row.place.line,
+            found,
+            needed,
+            advice,
+        })
     }
 
     /// The number in a cell (0-based column), if it is one that is `sound`.
     ///
     /// # Errors
-    /// The end of a sentence that begins with the file's name.
+    /// A cell without such a number, or with another decimal mark than earlier ones.
     pub fn number(
         &mut self,
         row: &Row,
         column: usize,
         sound: impl Fn(f64) -> bool,
-    ) -> Result<f64, String> {
+    ) -> Result<f64, Error> {
         let text = row.text(column);
         self.agree_on_mark(row.place, text)?;
         match self.parse(text).filter(|value| sound(*value)) {
@@ -199,7 +201,7 @@ impl Table {
     }
 
     /// One file has one decimal mark: 1,234 beside 1.5 may be a thousand.
-    pub(crate) fn agree_on_mark(&mut self, place: Place, text: &str) -> Result<(), String> {
+    pub(crate) fn agree_on_mark(&mut self, place: Place, text: &str) -> Result<(), Error> {
         let looks_numeric = text.starts_with(|c: char| c.is_ascii_digit() || "+-.,".contains(c));
         let Some(mark) = text.chars().find(|c| ".,".contains(*c)) else {
             return Ok(());
@@ -208,11 +210,12 @@ impl Table {
             return Ok(());
         }
         match self.mark {
-            Some((other, row)) if other != mark => Err(format!(
-                "{place} holds {}, but row {row} has the decimal mark '{other}': \
-                 write every number with the same decimal mark and no mark between thousands",
-                quote(text)
-            )),
+            Some((other, row)) if other != mark => Err(Error::DecimalMark {
+                place,
+                text: quote(text),
+                row,
+                mark: other,
+            }),
             Some(_) => Ok(()),
             None => {
                 self.mark = Some((mark, place.row));
@@ -221,27 +224,33 @@ impl Table {
         }
     }
 
-    fn no_number(&self, row: &Row, column: usize) -> String {
+    fn no_number(&self, row: &Row, column: usize) -> Error {
         let text = row.text(column);
-        let found = match text.is_empty() {
-            true => "is empty".to_string(),
-            false => format!("holds {}", quote(text)),
-        };
         let advice = if self.delimiter == b',' && text.contains(',') {
             "write a decimal point, or separate columns by semicolons where numbers have decimal commas"
         } else {
             "give a finite number in every cell"
         };
-        format!(
-            "{}, column {}, {found}: {advice}",
-            row.place, self.names[column]
-        )
+        Error::Cell {
+            place: row.place,
+            column: self.names[column].clone(),
+            found: contents(text),
+            advice,
+        }
+    }
+}
+
+/// What a cell holds, as a sentence tells it.
+pub(crate) fn contents(text: &str) -> String {
+    match text.is_empty() {
+        true => "is empty".to_string(),
+        false => format!("holds {}", quote(text)),
     }
 }
 
 /// Workbooks and databases are no text.
-fn refuse_binary(head: &[u8]) -> Result<(), String> {
-    let kinds: [(&[u8], &str); 5] = [
+fn refuse_binary(head: &[u8]) -> Result<(), Error> {
+    let kinds: [(&[u8], &'static str); 5] = [
         (b"PK\x03\x04", "an Excel workbook or another archive"),
         (b"\xd0\xcf\x11\xe0", "an old Excel workbook"),
         (b"PAR1", "a Parquet file"),
@@ -249,7 +258,7 @@ fn refuse_binary(head: &[u8]) -> Result<(), String> {
         (b"MATLAB ", "a MATLAB file"),
     ];
     match kinds.iter().find(|(magic, _)| head.starts_with(magic)) {
-        Some((_, kind)) => Err(format!("is {kind}: save the table as CSV text")),
+        Some((_, kind)) => Err(Error::NotText(kind)),
         None => Ok(()),
     }
 }
@@ -292,12 +301,15 @@ fn likely_delimiter(head: &[u8]) -> u8 {
     best.copied().unwrap_or(b',')
 }
 
-fn damaged(error: &csv::Error, skipped: u64) -> String {
+fn damaged(error: &csv::Error, skipped: u64) -> Error {
     match error.kind() {
-        csv::ErrorKind::Utf8 { pos, .. } => format!(
-            "line {} is not UTF-8: save the table as UTF-8 text",
-            pos.as_ref().map_or(0, csv::Position::line) + skipped
-        ),
-        _ => format!("cannot be read ({error}): name a CSV file"),
+        csv::ErrorKind::Utf8 { pos, .. } => Error::NotUtf8 {
+            line: pos.as_ref().map_or(0, csv::Position::line) + skipped,
+        },
+        _ => Error::Unreadable {
+            kind: "",
+            why: error.to_string(),
+            advice: "name a CSV file",
+        },
     }
 }

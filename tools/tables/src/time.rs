@@ -1,7 +1,7 @@
 //! The time column of a table: which one it is, what it says, and whether it keeps to a sample time.
 
-use crate::quote;
-use crate::table::{Place, Row, Table};
+use crate::table::{Place, Row, Table, contents};
+use crate::{Error, TimeColumnError, TimeError, quote};
 use jiff::Timestamp;
 use jiff::civil::DateTime;
 use jiff::tz::TimeZone;
@@ -79,19 +79,14 @@ fn looks_like_time(name: &str) -> bool {
     NAMES.contains(&base.as_str())
 }
 
-fn described(name: &str, index: usize) -> Result<TimeColumn, String> {
+fn described(name: &str, index: usize) -> Result<TimeColumn, TimeColumnError> {
     let unit = match split_unit(name).1 {
         None => 1.0,
         Some(unit) => UNITS
             .iter()
             .find(|(known, _)| *known == unit)
             .map(|(_, seconds)| *seconds)
-            .ok_or_else(|| {
-                format!(
-                    "has the time column {} whose unit is not known: use s, ms, us, ns, min or h",
-                    quote(name)
-                )
-            })?,
+            .ok_or_else(|| TimeColumnError::Unit(quote(name)))?,
     };
     Ok(TimeColumn {
         index,
@@ -104,22 +99,22 @@ fn described(name: &str, index: usize) -> Result<TimeColumn, String> {
 /// `taken` by signals are none.
 ///
 /// # Errors
-/// The end of a sentence that begins with the file's name.
+/// A named column that is not there or is there twice, two columns that may be meant, and a unit
+/// that is not known.
 pub fn find_time_column(
     names: &[String],
     said: Option<&str>,
     taken: &[usize],
-) -> Result<Option<TimeColumn>, String> {
+) -> Result<Option<TimeColumn>, TimeColumnError> {
     if let Some(said) = said {
         let mut found = (0..names.len()).filter(|&at| names[at] == said);
         return match (found.next(), found.next()) {
             (Some(at), None) => described(said, at).map(Some),
-            (None, _) => Err(format!(
-                "has no column {}, which time = names: use one of {}",
-                quote(said),
-                names.join(", ")
-            )),
-            (Some(_), Some(_)) => Err(format!("has two columns {said}: keep one of them")),
+            (None, _) => Err(TimeColumnError::Missing {
+                named: quote(said),
+                names: names.to_vec(),
+            }),
+            (Some(_), Some(_)) => Err(TimeColumnError::Twice(said.to_string())),
         };
     }
     let candidates: Vec<usize> = (0..names.len())
@@ -128,9 +123,9 @@ pub fn find_time_column(
     match candidates[..] {
         [] => Ok(None),
         [one] => described(&names[one], one).map(Some),
-        [one, other, ..] => Err(format!(
-            "has two columns that may be the time, {} and {}: say which by time = \"...\"",
-            names[one], names[other]
+        [one, other, ..] => Err(TimeColumnError::Ambiguous(
+            names[one].clone(),
+            names[other].clone(),
         )),
     }
 }
@@ -168,8 +163,8 @@ impl Clock {
     /// Takes the time of a row.
     ///
     /// # Errors
-    /// The end of a sentence that begins with the file's name.
-    pub fn read(&mut self, table: &mut Table, row: &Row) -> Result<(), String> {
+    /// A cell that holds no time of the kind that the first row has.
+    pub fn read(&mut self, table: &mut Table, row: &Row) -> Result<(), Error> {
         let text = row.text(self.column.index);
         let first = self.times.is_empty();
         let number = table.parse(text).filter(|value| value.is_finite());
@@ -195,17 +190,18 @@ impl Clock {
         self.resolution = self.resolution.min(step);
     }
 
-    fn no_time(&self, place: Place, text: &str) -> String {
-        let found = match text.is_empty() {
-            true => "is empty".into(),
-            false => format!("holds {}", quote(text)),
+    fn no_time(&self, place: Place, text: &str) -> Error {
+        let advice = match (self.times.is_empty(), self.origin) {
+            (true, _) => "give numbers in seconds or ISO time stamps such as 2026-03-01T12:00:00.5",
+            (false, None) => "give numbers throughout, as the first row has",
+            (false, Some(_)) => "give ISO time stamps throughout, as the first row has",
         };
-        let kind = match (self.times.is_empty(), self.origin) {
-            (true, _) => "numbers in seconds or ISO time stamps such as 2026-03-01T12:00:00.5",
-            (false, None) => "numbers throughout, as the first row has",
-            (false, Some(_)) => "ISO time stamps throughout, as the first row has",
-        };
-        format!("{place}, column {}, {found}: give {kind}", self.column.name)
+        Error::Cell {
+            place,
+            column: self.column.name.clone(),
+            found: contents(text),
+            advice,
+        }
     }
 
     fn place(&self, index: usize) -> Place {
@@ -218,31 +214,36 @@ impl Clock {
     /// Refuses gaps, doubled rows and a sampling rate that is not that of `sample_time` seconds.
     ///
     /// # Errors
-    /// The end of a sentence that begins with the file's name.
-    pub fn check_uniform(&self, sample_time: f64) -> Result<(), String> {
+    /// The first row where they do not.
+    pub fn check_uniform(&self, sample_time: f64) -> Result<(), TimeError> {
         let rounding = (self.resolution / sample_time).min(ROUNDING);
         let tolerance = JITTER.max(rounding) * (1.0 + 1e-9) + 1e-9;
-        let name = &self.column.name;
         for (at, pair) in self.times.windows(2).enumerate() {
             let &[before, now] = pair else { continue };
             let place = self.place(at + 1);
             if ((now - before) / sample_time - 1.0).abs() > tolerance {
-                return Err(format!(
-                    "{place}: {name} goes from {before} to {now}, but sample_time is {sample_time}: \
-                     record without gaps, one row per sample{}",
-                    self.coarse(sample_time)
-                ));
+                return Err(TimeError::Step {
+                    place,
+                    column: self.column.name.clone(),
+                    before,
+                    now,
+                    sample_time,
+                    resolution: self.resolution,
+                });
             }
             let samples = (at + 1) as f64;
             let since = now - self.times[0];
             let off = (since / sample_time - samples).abs();
             if off > DRIFT * samples + 2.0 * tolerance {
-                return Err(format!(
-                    "{place}: {name} is {now}, {since} s after row 1, where {samples} samples of sample_time {sample_time} \
-                     make {} s; on average its rows are {:.6} s apart: set sample_time to that of the log, or resample the log",
-                    samples * sample_time,
-                    self.mean_step()
-                ));
+                return Err(TimeError::Drift {
+                    place,
+                    column: self.column.name.clone(),
+                    now,
+                    since,
+                    samples,
+                    sample_time,
+                    mean: self.mean_step(),
+                });
             }
         }
         Ok(())
@@ -258,31 +259,19 @@ impl Clock {
         }
     }
 
-    fn coarse(&self, sample_time: f64) -> String {
-        if self.resolution > 0.5 * sample_time {
-            format!(
-                "; its times are printed in steps of {} s, log more digits if that is why",
-                self.resolution
-            )
-        } else {
-            String::new()
-        }
-    }
-
     /// Refuses times that do not ascend.
     ///
     /// # Errors
-    /// The end of a sentence that begins with the file's name.
-    pub fn check_ascending(&self) -> Result<(), String> {
+    /// The first row that is not later than the one before.
+    pub fn check_ascending(&self) -> Result<(), TimeError> {
         let bad = self.times.windows(2).position(|pair| pair[1] <= pair[0]);
         bad.map_or(Ok(()), |at| {
-            Err(format!(
-                "{}: {} goes from {} to {}: give the rows in ascending order of time, each time once",
-                self.place(at + 1),
-                self.column.name,
-                self.times[at],
-                self.times[at + 1]
-            ))
+            Err(TimeError::Order {
+                place: self.place(at + 1),
+                column: self.column.name.clone(),
+                before: self.times[at],
+                now: self.times[at + 1],
+            })
         })
     }
 }

@@ -109,7 +109,7 @@ fn call() -> impl Strategy<Value = Call> {
 }
 
 /// An instance, the importer's time, and the states it has saved.
-struct Player {
+struct Caller {
     it: Instance,
     time: f64,
     saved: Vec<(Pointer, f64)>,
@@ -118,7 +118,7 @@ struct Player {
 /// What a call gave: its status and the bits of what it returned.
 type Answer = (Status, Vec<u64>);
 
-impl Player {
+impl Caller {
     fn new(resources: &Resources) -> Self {
         Self {
             it: Instance::new(resources),
@@ -288,9 +288,9 @@ proptest! {
     #[test]
     fn nothing_crashes_and_instances_agree(calls in prop::collection::vec(call(), 1..120)) {
         let resources = Resources::new(0.1);
-        let mut players = [Player::new(&resources), Player::new(&resources)];
+        let mut callers = [Caller::new(&resources), Caller::new(&resources)];
         for call in &calls {
-            let [one, other] = players.each_mut().map(|player| player.play(call));
+            let [one, other] = callers.each_mut().map(|caller| caller.play(call));
             prop_assert_ne!(one.0, Status::Fatal);
             prop_assert_eq!(one, other);
         }

@@ -4,7 +4,7 @@
 
 use crate::Pair;
 use fmu_host::model::location;
-use fmu_host::{Instance, Model};
+use fmu_host::{Instance, Model, NotInstantiated};
 use ftc_design::Design;
 use model_description::{DESIGN_FILE, read_design, write_design};
 use std::fs;
@@ -24,10 +24,11 @@ fn refusal(pair: &Pair, which: usize, bytes: Option<&[u8]>) -> String {
     ))
 }
 
-fn sentence(made: Result<Instance, String>) -> String {
-    let Err(message) = made else {
+fn sentence(made: Result<Instance, NotInstantiated>) -> String {
+    let Err(refused) = made else {
         panic!("an instance was made");
     };
+    let message = refused.to_string();
     assert!(message.starts_with("fmi2Instantiate: "), "{message}");
     assert_eq!(message.lines().count(), 1, "{message}");
     message
@@ -61,32 +62,32 @@ fn missing_empty_truncated_and_damaged_designs_are_refused() {
 fn designs_of_another_layout_or_of_other_sizes_are_refused() {
     let pair = Pair::load();
     let bytes = design(&pair.models[0]);
-    let honest = read_design(&bytes).unwrap();
-    let forged = |change: &dyn Fn(&mut Design)| {
-        let mut forged = honest.clone();
-        change(&mut forged);
-        write_design(&forged).unwrap()
+    let exported = read_design(&bytes).unwrap();
+    let altered = |change: &dyn Fn(&mut Design)| {
+        let mut altered = exported.clone();
+        change(&mut altered);
+        write_design(&altered).unwrap()
     };
     // The last four: an empty map, nested lists, bytes and a map that announce more than there is.
-    let forgeries = [
-        forged(&|design| design.format = 0),
-        forged(&|design| design.controller.feedback.tracked = vec![0, 7]),
-        forged(&|design| design.scenario.noise.truncate(1)),
-        forged(&|design| design.controller.estimator.response_length = 1_000_000_000_000_000),
-        forged(&|design| design.controller.estimator.window = 1_000_000_000_000_000),
+    let alterations = [
+        altered(&|design| design.format = 0),
+        altered(&|design| design.controller.feedback.tracked = vec![0, 7]),
+        altered(&|design| design.scenario.noise.truncate(1)),
+        altered(&|design| design.controller.estimator.response_length = 1_000_000_000_000_000),
+        altered(&|design| design.controller.estimator.window = 1_000_000_000_000_000),
         bytes[..bytes.len() / 2].to_vec(),
         vec![0x80],
         vec![0x91; 1_000_000],
         vec![0xC6, 0xFF, 0xFF, 0xFF, 0xFF],
         vec![0xDF, 0xFF, 0xFF, 0xFF, 0xFF],
     ];
-    for forged in forgeries {
-        assert!(forged != bytes);
+    for altered in alterations {
+        assert!(altered != bytes);
         let binaries = ["ftc_controller", "ftc_plant"];
         for (which, binary) in binaries.into_iter().enumerate() {
             let folder = tempfile::tempdir().unwrap();
-            fs::write(folder.path().join(DESIGN_FILE), &forged).unwrap();
-            let guid = model_description::guid(binary, &forged);
+            fs::write(folder.path().join(DESIGN_FILE), &altered).unwrap();
+            let guid = model_description::guid(binary, &altered);
             let location = location(folder.path());
             let made = Instance::made(
                 pair.functions()[which],

@@ -94,7 +94,7 @@ fn damaged_and_foreign_bytes_are_refused() {
     }
 }
 
-/// Bytes that somebody forged under a checksum that holds. Found by fuzzing: a state said to be
+/// Bytes that somebody altered under a checksum that holds. Found by fuzzing: a state said to be
 /// "fatal" was taken, and then nothing could be done with the instance any more.
 #[test]
 fn forged_phases_and_sizes_are_refused() {
@@ -107,11 +107,11 @@ fn forged_phases_and_sizes_are_refused() {
     {
         let bytes = it.bytes();
         let read = |at: usize, value: u8| {
-            let mut forged = bytes[..bytes.len() - 4].to_vec();
-            forged[at] = value;
-            let checksum = crc32fast::hash(&forged);
-            forged.extend(checksum.to_le_bytes());
-            it.read_bytes(&forged)
+            let mut altered = bytes[..bytes.len() - 4].to_vec();
+            altered[at] = value;
+            let checksum = crc32fast::hash(&altered);
+            altered.extend(checksum.to_le_bytes());
+            it.read_bytes(&altered)
         };
         // A mark of 8 bytes, the length of the guid, the guid, the phase by its number.
         let phase = 8 + 1 + model.guid.len();
@@ -122,7 +122,7 @@ fn forged_phases_and_sizes_are_refused() {
         for never in [3, 5, 8, 9, 255] {
             assert!(read(phase, never).is_null(), "phase {never}");
         }
-        // Whatever byte is forged: refused, or as good as any state.
+        // Whatever byte is altered: refused, or as good as any state.
         let body = &bytes[..bytes.len() - 4];
         for (at, byte) in body.iter().enumerate().skip(8) {
             let state = read(at, byte ^ 0x55);

@@ -14,6 +14,7 @@
 //! * it is used, sensor by sensor, only while its predictions have been better than those of the
 //!   database alone, both judged before learning from the sample.
 
+use super::least_squares::LeastSquares;
 use crate::kernel;
 use crate::matrix::Matrix;
 use crate::parameters::Predictor;
@@ -25,12 +26,8 @@ use serde::{Deserialize, Serialize};
 /// The adapted response of one mode, with `q = m j` regressors.
 #[derive(Debug, PartialEq, Serialize, Deserialize)]
 pub struct Adaptation {
-    /// Adapted less database response (p x q, row after row).
-    change: Vec<f64>,
-    /// Covariance in units of the noise variance (q x q, symmetric).
-    covariance: Vec<f64>,
-    /// Covariance times regressor (q).
-    direction: Vec<f64>,
+    /// Adapted less database response (p x q).
+    change: LeastSquares,
     /// What the change would add to the prediction, as learned (p).
     addition: Vec<f64>,
     /// The largest change of each output that is admitted in this sample (p).
@@ -42,15 +39,7 @@ pub struct Adaptation {
 }
 
 crate::state!(Adaptation {
-    parts: [
-        change,
-        covariance,
-        direction,
-        addition,
-        bound,
-        fixed_error,
-        adapted_error
-    ],
+    parts: [change, addition, bound, fixed_error, adapted_error],
     constants: [],
     counters: []
 });
@@ -60,9 +49,7 @@ impl Adaptation {
     pub fn new(predictor: &Predictor) -> Self {
         let (outputs, size) = predictor.response.shape();
         Self {
-            change: vec![0.0; outputs * size],
-            covariance: covariance(&predictor.factor),
-            direction: vec![0.0; size],
+            change: LeastSquares::new(outputs, size, covariance(&predictor.factor)),
             addition: vec![0.0; outputs],
             bound: vec![0.0; outputs],
             fixed_error: vec![0.0; outputs],
@@ -79,10 +66,9 @@ impl Adaptation {
         y0: &[f64],
         prediction: &[f64],
     ) {
-        let size = regressor.len().max(1);
-        let rows = self.change.chunks_exact(size);
-        for (sum, row) in self.addition.iter_mut().zip(rows) {
-            *sum = kernel::bounded(kernel::dot(row, regressor));
+        let changes = self.change.responses(regressor);
+        for (addition, change) in self.addition.iter_mut().zip(changes) {
+            *addition = kernel::bounded(change);
         }
         let outputs = prediction.iter().zip(y0).zip(&predictor.deviation);
         for (bound, ((value, centre), deviation)) in self.bound.iter_mut().zip(outputs) {
@@ -115,24 +101,19 @@ impl Adaptation {
         if !error.iter().zip(&self.bound).all(believable) {
             return;
         }
-        let size = regressor.len().max(1);
-        let rows = self.covariance.chunks_exact(size);
-        for (value, row) in self.direction.iter_mut().zip(rows) {
-            *value = kernel::dot(row, regressor);
-        }
-        let scale = 1.0 / (1.0 + kernel::dot(&self.direction, regressor).max(0.0));
-        let rows = self.change.chunks_exact_mut(size).zip(&self.addition);
         let scores = self.fixed_error.iter_mut().zip(&mut self.adapted_error);
-        let errors = error.iter().zip(&self.bound);
-        for (((row, &addition), (&error, &bound)), (fixed, adapted)) in rows.zip(errors).zip(scores)
-        {
-            update_mean(fixed, error);
-            update_mean(adapted, error - addition.clamp(-bound, bound));
-            kernel::add_scaled(row, scale * (error - addition), &self.direction);
-            kernel::bound(row);
-        }
-        kernel::subtract_square(&mut self.covariance, scale, &self.direction);
-        kernel::bound(&mut self.covariance);
+        let additions = self.addition.iter().zip(&self.bound);
+        let mut left = error.iter().zip(additions).zip(scores).map(
+            |((&error, (&addition, &bound)), (fixed, adapted))| {
+                update_mean(fixed, error);
+                update_mean(adapted, error - addition.clamp(-bound, bound));
+                error - addition
+            },
+        );
+        self.change.aim(regressor);
+        let leverage = self.change.leverage(regressor);
+        self.change
+            .learn(leverage, 1.0, |_| left.next().unwrap_or(0.0));
     }
 }
 

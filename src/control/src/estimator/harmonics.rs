@@ -5,6 +5,7 @@
 //! the regressor is the same for every sensor, so one covariance serves all. While a fault is
 //! declared nothing is learned and the last coefficients extrapolate.
 
+use super::least_squares::LeastSquares;
 use crate::kernel;
 use crate::parameters::{Harmonics, PhasorMap};
 use crate::tuning::TUNING;
@@ -12,23 +13,19 @@ use alloc::vec;
 use alloc::vec::Vec;
 use serde::{Deserialize, Serialize};
 
-/// Learned coefficients of one mode, with `q = 2 x harmonics` regressors.
+/// What was learned in one mode, with `q = 2 x harmonics` regressors.
 #[derive(Debug, PartialEq, Serialize, Deserialize)]
 pub struct HarmonicState {
-    /// Coefficients per sensor (p x q, row after row).
-    coefficients: Vec<f64>,
-    /// Covariance in units of the noise variance (q x q, symmetric).
-    covariance: Vec<f64>,
+    /// Sines and cosines that fit the residuals (p).
+    fit: LeastSquares,
     /// `[sin(w k), cos(w k), sin(2 w k), ...]` (q).
     regressor: Vec<f64>,
-    /// Covariance times regressor (q).
-    direction: Vec<f64>,
     /// Samples learned from.
     samples: u64,
 }
 
 crate::state!(HarmonicState {
-    parts: [coefficients, covariance, regressor, direction],
+    parts: [fit, regressor],
     constants: [],
     counters: [samples]
 });
@@ -37,16 +34,9 @@ impl HarmonicState {
     /// Nothing learned yet.
     pub fn new(harmonics: &Harmonics, outputs: usize) -> Self {
         let size = 2 * harmonics.count;
-        let mut covariance = vec![0.0; size * size];
-        covariance
-            .iter_mut()
-            .step_by(size + 1)
-            .for_each(|v| *v = harmonics.initial_variance);
         Self {
-            coefficients: vec![0.0; outputs * size],
-            covariance,
+            fit: LeastSquares::with_variance(outputs, size, harmonics.initial_variance),
             regressor: vec![0.0; size],
-            direction: vec![0.0; size],
             samples: 0,
         }
     }
@@ -71,15 +61,8 @@ impl HarmonicState {
 
     /// Variance of the learned response, in units of the noise variance.
     pub fn leverage(&mut self) -> f64 {
-        let size = self.regressor.len().max(1);
-        for (value, row) in self
-            .direction
-            .iter_mut()
-            .zip(self.covariance.chunks_exact(size))
-        {
-            *value = kernel::dot(row, &self.regressor);
-        }
-        kernel::dot(&self.direction, &self.regressor).max(0.0)
+        self.fit.aim(&self.regressor);
+        self.fit.leverage(&self.regressor)
     }
 
     /// The sines and cosines of the last [`rotate`](Self::rotate) (q).
@@ -89,15 +72,12 @@ impl HarmonicState {
 
     /// The learned response of each sensor.
     pub fn responses(&self) -> impl Iterator<Item = f64> {
-        let size = self.regressor.len().max(1);
-        let rows = self.coefficients.chunks_exact(size);
-        rows.map(|row| kernel::dot(row, &self.regressor))
+        self.fit.responses(&self.regressor)
     }
 
     /// Replaces what was learned of one sensor (q).
     pub fn replace(&mut self, sensor: usize, waves: &[f64]) {
-        let size = self.regressor.len().max(1);
-        if let Some(row) = self.coefficients.chunks_exact_mut(size).nth(sensor) {
+        if let Some(row) = self.fit.row_mut(sensor) {
             kernel::copy(row, waves);
         }
     }
@@ -120,53 +100,44 @@ impl HarmonicState {
         deviations: impl Iterator<Item = f64> + Clone,
     ) {
         let size = self.regressor.len().max(1);
-        self.coefficients.fill(0.0);
-        for (harmonic, map) in maps.iter().enumerate() {
-            let (sine, cosine) = (2 * harmonic, 2 * harmonic + 1);
-            for (row, to) in self.coefficients.chunks_exact_mut(size).enumerate() {
-                for (column, from) in other.coefficients.chunks_exact(size).enumerate() {
-                    let (Some(re), Some(im)) =
-                        (map.real.get(row, column), map.imaginary.get(row, column))
-                    else {
-                        continue;
-                    };
-                    if let (Some(&a), Some(&b)) = (from.get(sine), from.get(cosine)) {
-                        add_at(to, sine, re * a - im * b);
-                        add_at(to, cosine, im * a + re * b);
+        let moved = |coefficients: &mut [f64]| {
+            for (harmonic, map) in maps.iter().enumerate() {
+                let (sine, cosine) = (2 * harmonic, 2 * harmonic + 1);
+                for (row, to) in coefficients.chunks_exact_mut(size).enumerate() {
+                    for (column, from) in other.fit.rows().enumerate() {
+                        let (Some(re), Some(im)) =
+                            (map.real.get(row, column), map.imaginary.get(row, column))
+                        else {
+                            continue;
+                        };
+                        if let (Some(&a), Some(&b)) = (from.get(sine), from.get(cosine)) {
+                            add_at(to, sine, re * a - im * b);
+                            add_at(to, cosine, im * a + re * b);
+                        }
                     }
                 }
             }
-        }
-        kernel::bound(&mut self.coefficients);
-        let rows = self.coefficients.chunks_exact(size).zip(deviations);
-        let doubt = rows
-            .map(|(row, deviation)| {
+        };
+        let variance = |fit: &LeastSquares| {
+            let rows = fit.rows().zip(deviations);
+            let relative = rows.map(|(row, deviation)| {
                 TUNING.transfer_error * libm::sqrt(kernel::dot(row, row)) / deviation
-            })
-            .fold(0.0, f64::max);
-        kernel::copy(&mut self.covariance, &other.covariance);
-        let variance = kernel::bounded(doubt * doubt);
-        self.covariance
-            .iter_mut()
-            .step_by(size + 1)
-            .for_each(|v| *v = kernel::bounded(*v + variance));
+            });
+            let largest = relative.fold(0.0, f64::max);
+            largest * largest
+        };
+        self.fit.start_from(&other.fit, moved, variance);
     }
 
     /// One step of recursive least squares on the residuals (p) of a healthy sample.
     /// Call [`rotate`](Self::rotate) and [`leverage`](Self::leverage) of the same tick first.
     pub fn learn(&mut self, harmonics: &Harmonics, residual: &[f64]) {
         self.samples = self.samples.saturating_add(1);
-        let size = self.regressor.len().max(1);
         let keep = 1.0 - 1.0 / harmonics.memory.max(2.0);
-        let scale = 1.0 / (keep + kernel::dot(&self.direction, &self.regressor).max(0.0));
-        for (row, &error) in self.coefficients.chunks_exact_mut(size).zip(residual) {
-            kernel::add_scaled(row, scale * error, &self.direction);
-            kernel::bound(row);
-        }
-        kernel::subtract_square(&mut self.covariance, scale, &self.direction);
-        for value in &mut self.covariance {
-            *value = kernel::bounded(*value / keep);
-        }
+        let mut errors = residual.iter().copied();
+        let leverage = self.fit.leverage(&self.regressor);
+        self.fit
+            .learn(leverage, keep, |_| errors.next().unwrap_or(0.0));
     }
 }
 

@@ -11,6 +11,7 @@ mod decision;
 mod derivative;
 mod harmonics;
 pub mod hypotheses;
+mod least_squares;
 mod predictor;
 mod recovery;
 mod window;
@@ -399,7 +400,7 @@ impl EstimatorState {
         let settled = learned.is_settled(known);
         let mut corrected = false;
         for (sensor, &threshold) in seen.thresholds.iter().enumerate() {
-            if let Some(waves) = recovery.acquittal(sensor, threshold, settled) {
+            if let Some(waves) = recovery.explanation(sensor, threshold, settled) {
                 learned.replace(sensor, waves);
                 corrected = true;
             }

@@ -89,6 +89,7 @@ pub struct Candidate {
 
 /// The largest margin by which all inequalities hold at once.
 #[derive(Clone, Debug)]
+#[non_exhaustive]
 pub struct Margin {
     /// `t*`: every inequality holds with `>= t* I`.
     pub margin: f64,

@@ -25,6 +25,7 @@ use serde::{Deserialize, Serialize};
 
 /// What, beside plant and gains, proves the error stable with sensors lost.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[non_exhaustive]
 pub struct LostCertificate {
     /// Decay rate of the error's function while the set does not change.
     pub decay: f64,

@@ -94,7 +94,7 @@ pub(super) fn blended(
     function: &DMatrix<f64>,
     decay: f64,
 ) -> Option<DMatrix<f64>> {
-    // Room for rounding, so that the proof goes through.
+    // A margin for rounding errors in the proof.
     let decay = decay * (1.0 - 1e-7);
     let root = function.clone().cholesky()?.unpack();
     let inverse = root.clone().try_inverse()?;

@@ -161,7 +161,7 @@ impl Channel<'_> {
         finite.then(|| Response::new(a, b, c, d))
     }
 
-    /// A lower bound of the l2 gain, at most a hair below it (see [`Response::norm`]).
+    /// A lower bound of the l2 gain, the peak of the response on a grid (see [`Response::norm`]).
     pub fn norm(&self) -> f64 {
         self.response().map_or(f64::INFINITY, |found| found.norm())
     }

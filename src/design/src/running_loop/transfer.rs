@@ -29,6 +29,7 @@ pub const TRANSFER_DECAY: f64 = 0.5;
 
 /// What proves bumpless transfer.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[non_exhaustive]
 pub struct TransferCertificate {
     /// `rho`: the function shrinks by its square in a sample.
     pub decay: f64,

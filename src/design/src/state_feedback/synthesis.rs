@@ -26,8 +26,8 @@ pub(super) const RELAXATIONS: [f64; 6] = [2e-5, 1e-4, 1e-3, 1e-2, 1e-1, 1.0];
 /// A margin below this is no margin: the solver's own accuracy.
 const SMALLEST_MARGIN: f64 = 1e-9;
 
-/// A margin beyond doubt.
-const SURE_MARGIN: f64 = 1e-6;
+/// A margin that rounding errors in the proof cannot take away.
+const PROVABLE_MARGIN: f64 = 1e-6;
 
 /// A margin above this needs no better coordinates.
 const SUFFICIENT_MARGIN: f64 = 1e-2;
@@ -153,7 +153,7 @@ pub(super) fn succeeds(
     let models = augment(plant, spec, &units);
     let stabilised = spec.lyapunov.groups(models.len()).iter().all(|group| {
         let found = stable(&models, spec, group, run);
-        found.is_ok_and(|(margin, parts)| parts.is_some() && margin.margin >= SURE_MARGIN)
+        found.is_ok_and(|(margin, parts)| parts.is_some() && margin.margin >= PROVABLE_MARGIN)
     });
     stabilised && attempt(plant, spec, scaling, run).is_ok()
 }
@@ -202,7 +202,9 @@ fn stable_by(
     run: &Run,
 ) -> Result<(Margin, Option<Vec<Part>>), SolverFailure> {
     let plain = match stabilise(solver, models, spec, group, run) {
-        Ok((margin, parts)) if margin.margin >= SURE_MARGIN => return Ok((margin, Some(parts))),
+        Ok((margin, parts)) if margin.margin >= PROVABLE_MARGIN => {
+            return Ok((margin, Some(parts)));
+        }
         uncertain => uncertain,
     };
     let regulated = Transformation::of_regulated(models, group, spec.decay).map(|transformation| {
@@ -210,7 +212,7 @@ fn stable_by(
         found.map(|(margin, parts)| (margin, transformation.restore(parts)))
     });
     match regulated {
-        Some(Ok((margin, parts))) if margin.margin >= SURE_MARGIN => {
+        Some(Ok((margin, parts))) if margin.margin >= PROVABLE_MARGIN => {
             return Ok((margin, Some(parts)));
         }
         // Both must have an answer, unless the other solver has been asked already.

@@ -19,6 +19,7 @@ use crate::plant::PlantState;
 use clarabel::algebra::CscMatrix;
 use clarabel::solver::{DefaultSettings, DefaultSolver, IPSolver, SupportedConeT};
 use ftc_control::parameters::Limits;
+use ftc_design::riccati;
 use ftc_plant::{Mode, SwitchedPlant};
 use nalgebra::{DMatrix, DVector};
 use std::ops::AddAssign;
@@ -72,6 +73,7 @@ struct Planner {
 /// Why a mode has no predictive controller.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[error("mode {mode}: {cause}")]
+#[non_exhaustive]
 pub struct PredictiveError {
     /// The mode, from 1.
     pub mode: usize,
@@ -92,17 +94,10 @@ pub enum PredictiveCause {
     /// The Kalman filter cannot be computed.
     #[error("the filter's innovation covariance is singular")]
     SingularInnovation,
-    /// A Riccati recursion broke down.
-    #[error("the Riccati recursion lost definiteness")]
-    Indefinite,
-    /// A Riccati recursion does not converge.
-    #[error("the Riccati recursion does not converge: the mode cannot be stabilised")]
+    /// A Riccati equation has no solution.
+    #[error("the Riccati equation has no solution: the mode cannot be stabilised")]
     NotStabilisable,
 }
-
-/// Iterations of a Riccati recursion, and the relative change that ends it.
-const RICCATI_STEPS: usize = 20_000;
-const RICCATI_ACCURACY: f64 = 1e-13;
 
 impl Predictive {
     /// Prepares the controller of every mode, starting in `mode` (0-based).
@@ -276,10 +271,11 @@ impl Condensed {
         let weighted = DMatrix::from_diagonal(&DVector::from_column_slice(&spec.output_weight))
             * mode.c.select_rows(&spec.tracked);
         let state_cost = weighted.transpose() * &weighted;
-        let input_cost = DMatrix::from_diagonal(&DVector::from_fn(m, |i, _| {
-            spec.input_weight[i].powi(2).max(1e-9)
-        }));
-        let terminal = riccati(a, b, &state_cost, &input_cost)?;
+        let input_weights = DVector::from_fn(m, |i, _| spec.input_weight[i].powi(2).max(1e-9));
+        let reach = b * DMatrix::from_diagonal(&input_weights.map(f64::recip)) * b.transpose();
+        let input_cost = DMatrix::from_diagonal(&input_weights);
+        let terminal =
+            riccati::solve(a, &reach, &state_cost).ok_or(PredictiveCause::NotStabilisable)?;
         let (free, forced) = responses(a, b, spec.horizon);
         let mut weighted = forced.clone();
         for k in 0..spec.horizon {
@@ -415,48 +411,23 @@ fn kalman(
     let mut c = DMatrix::zeros(p, n + p);
     c.columns_mut(0, n).copy_from(&mode.c);
     c.columns_mut(n, p).fill_with_identity();
-    let square = |values: &[f64]| {
-        DMatrix::from_diagonal(&DVector::from_iterator(
-            values.len(),
-            values.iter().map(|v| v * v),
-        ))
-    };
-    let variance = square(&spec.noise);
-    let driven = &mode.e * square(&spec.disturbance) * mode.e.transpose();
-    let floor = 1e-2 * variance.diagonal().mean();
+    let squares =
+        |values: &[f64]| DVector::from_iterator(values.len(), values.iter().map(|v| v * v));
+    let variances = squares(&spec.noise);
+    let variance = DMatrix::from_diagonal(&variances);
+    let driven = &mode.e * DMatrix::from_diagonal(&squares(&spec.disturbance)) * mode.e.transpose();
+    let floor = 1e-2 * variances.mean();
     let mut process = DMatrix::identity(n + p, n + p) * floor;
     process.view_mut((0, 0), (n, n)).add_assign(&driven);
     process.view_mut((n, n), (p, p)).copy_from(&variance);
-    let covariance = riccati(&a.transpose(), &c.transpose(), &process, &variance)?;
+    let reach = c.transpose() * DMatrix::from_diagonal(&variances.map(f64::recip)) * &c;
+    let covariance =
+        riccati::solve(&a.transpose(), &reach, &process).ok_or(PredictiveCause::NotStabilisable)?;
     let innovation = &c * &covariance * c.transpose() + variance;
     let inverse = innovation
         .try_inverse()
         .ok_or(PredictiveCause::SingularInnovation)?;
     Ok(covariance * c.transpose() * inverse)
-}
-
-/// The stabilising solution of the discrete Riccati equation, by recursion.
-fn riccati(
-    a: &DMatrix<f64>,
-    b: &DMatrix<f64>,
-    state_cost: &DMatrix<f64>,
-    input_cost: &DMatrix<f64>,
-) -> Result<DMatrix<f64>, PredictiveCause> {
-    let mut value = state_cost.clone();
-    for _ in 0..RICCATI_STEPS {
-        let gain = (input_cost + b.transpose() * &value * b)
-            .cholesky()
-            .ok_or(PredictiveCause::Indefinite)?
-            .solve(&(b.transpose() * &value * a));
-        let next = state_cost + a.transpose() * &value * (a - b * gain);
-        let next = 0.5 * (&next + next.transpose());
-        let change = (&next - &value).norm();
-        value = next;
-        if change <= RICCATI_ACCURACY * value.norm() {
-            return Ok(value);
-        }
-    }
-    Err(PredictiveCause::NotStabilisable)
 }
 
 #[cfg(test)]

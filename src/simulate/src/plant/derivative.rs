@@ -124,7 +124,7 @@ impl PlantSimulator {
             .zip(&mut trial.last);
         let clean = trial.y_true.iter().zip(change.fault);
         for (sensor, (((y, fault), last), (&healthy, &added))) in read.zip(clean).enumerate() {
-            let struck = self.striking(sensor, tick, events);
+            let struck = self.acting(sensor, tick, events);
             let healthy = if late { 0.0 } else { healthy };
             (*y, *fault) = differentiate_sensor(struck, healthy, added, last);
         }

@@ -15,7 +15,7 @@ fn healthy(design: &Design, horizon: usize, input_weight: f64) -> [f64; 2] {
 }
 
 /// Percentage points of true VAF that a neighbouring choice may be ahead.
-const LITTLE: f64 = 0.01;
+const SMALL_SHARE: f64 = 0.01;
 
 /// Twice or half the horizon, three times or a third of the weight: none is better for either output.
 #[test]
@@ -28,7 +28,7 @@ fn no_neighbouring_choice_makes_the_predictive_controller_better() {
             println!("{horizon} samples, {factor:.2} times the weight: {neighbour:.4?}");
             for (other, own) in neighbour.iter().zip(chosen) {
                 assert!(
-                    *other <= own + LITTLE,
+                    *other <= own + SMALL_SHARE,
                     "{other} % against {own} % with {horizon} samples and {factor} times the weight"
                 );
             }

@@ -73,12 +73,12 @@ fn lead_over_mpc(trial: &Trial) -> f64 {
 
 /// Faults under which the proposed controller is ahead by more than the noise explains.
 fn ahead(trials: &[Trial]) -> usize {
-    let clear = |trial: &&Trial| lead_over_mpc(trial) > noise_worth(trial);
+    let clear = |trial: &&Trial| lead_over_mpc(trial) > noise_gain(trial);
     faulty(trials).filter(clear).count()
 }
 
 /// VAF that the noise of the faulty sensor alone would cost, in percent: less is no difference.
-fn noise_worth(trial: &Trial) -> f64 {
+fn noise_gain(trial: &Trial) -> f64 {
     let (Some((sensor, _)), Some(run)) = (trial.case.fault, trial.of(Variant::Ftc)) else {
         return 0.0;
     };
@@ -259,7 +259,7 @@ fn notes(trials: &[Trial]) -> Vec<String> {
     let mut notes = Vec::new();
     let names = |pick: fn(f64, f64) -> bool| -> Vec<String> {
         faulty(trials)
-            .filter(|trial| pick(lead_over_mpc(trial), noise_worth(trial)))
+            .filter(|trial| pick(lead_over_mpc(trial), noise_gain(trial)))
             .map(|trial| format!("{}, {}", sensor_name(trial), trial.case.words))
             .collect()
     };

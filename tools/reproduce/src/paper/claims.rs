@@ -3,6 +3,7 @@
 use super::printed::{self, Absorption, DoubledDisturbance, Latency};
 use super::reachable::{REPORTED, largest_variance};
 use super::{ControllerKind, NOISES, REFERENCES, Record};
+use crate::Error;
 use ftc_design::as_printed::PrintedVerdict;
 use report::text::{aligned, number};
 use serde::Serialize;
@@ -53,7 +54,7 @@ fn claim(
 
 impl Claims {
     /// Puts every printed result to the test.
-    pub fn find(record: &Record) -> Result<Self, String> {
+    pub fn find(record: &Record) -> Result<Self, Error> {
         let mut claims = Self {
             theorems: printed::theorems()?,
             sliding_window: printed::absorption(),

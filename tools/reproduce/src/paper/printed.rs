@@ -1,7 +1,7 @@
 //! The printed results one by one, computed on the paper's own plant.
 
 use super::CHANNELS;
-use crate::experiment;
+use crate::{Error, experiment};
 use ftc_control::estimator::SlidingWindow;
 use ftc_control::parameters::FeedbackGains;
 use ftc_design::as_printed::{PrintedVerdict, theorem_1, theorem_2};
@@ -13,17 +13,16 @@ use nalgebra::DMatrix;
 use serde::Serialize;
 
 /// Both printed theorems on the paper's plant.
-pub fn theorems() -> Result<[PrintedVerdict; 2], String> {
+pub fn theorems() -> Result<[PrintedVerdict; 2], Error> {
     let request = request()?;
-    let solve = |verdict: Result<PrintedVerdict, DesignError>| verdict.map_err(|e| e.to_string());
     Ok([
-        solve(theorem_1(&request.plant))?,
-        solve(theorem_2(&request.plant, &request.control))?,
+        theorem_1(&request.plant)?,
+        theorem_2(&request.plant, &request.control)?,
     ])
 }
 
 /// The example with the disturbance on the state, as in section VII-A.
-fn request() -> Result<Request, String> {
+fn request() -> Result<Request, Error> {
     experiment::request(CHANNELS[0].1)
 }
 
@@ -87,9 +86,9 @@ pub struct DoubledDisturbance {
 
 /// The augmented disturbance matrix `diag(E, E)` is that of a plant with a second disturbance that
 /// enters the output by `F = -E / Te`.
-pub fn doubled_disturbance() -> Result<DoubledDisturbance, String> {
+pub fn doubled_disturbance() -> Result<DoubledDisturbance, Error> {
     let Request { plant, control, .. } = request()?;
-    let sound = synthesise(&plant, &control).map_err(|error| error.to_string())?;
+    let sound = synthesise(&plant, &control)?;
     let te = plant.sample_time;
     let double = |mode: &Mode| {
         let (n, s) = mode.e.shape();
@@ -140,10 +139,10 @@ pub struct Latency {
 }
 
 /// Latency 0 run with one sample of delay, and latency 1 under every certificate, decay 0.9.
-pub fn latency() -> Result<Latency, String> {
+pub fn latency() -> Result<Latency, Error> {
     const DECAY: f64 = 0.9;
     let Request { plant, control, .. } = request()?;
-    let prompt = synthesise(&plant, &control).map_err(|error| error.to_string())?;
+    let prompt = synthesise(&plant, &control)?;
     let gains = prompt.for_controller(&plant).modes;
     let ignored = plant.modes.iter().zip(&gains);
     let delayed = |lyapunov| {
@@ -156,7 +155,7 @@ pub fn latency() -> Result<Latency, String> {
         match synthesise(&plant, &spec) {
             Ok(feedback) => Ok(Some(feedback)),
             Err(DesignError::Infeasible(_)) => Ok(None),
-            Err(error) => Err(error.to_string()),
+            Err(error) => Err(Error::from(error)),
         }
     };
     let dwell = delayed(Lyapunov::Dwell)?;

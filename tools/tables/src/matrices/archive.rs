@@ -1,6 +1,7 @@
 //! NumPy archives, as `numpy.savez` and `numpy.savez_compressed` write them.
 
 use super::{Found, MOST_ENTRIES, check_shape, from_columns};
+use crate::{EntryError, Error, MatrixError};
 use nalgebra::DMatrix;
 use npyz::{DType, NpyFile, Order, TypeChar};
 use std::io::{Cursor, Read};
@@ -9,16 +10,15 @@ use zip::ZipArchive;
 /// The most arrays of an archive.
 const MOST_ARRAYS: usize = 10_000;
 
-pub(super) fn read(bytes: Vec<u8>) -> Result<Found, String> {
-    let damaged = |error: zip::result::ZipError| {
-        format!("cannot be read as a NumPy archive ({error}): save it again with numpy.savez")
+pub(super) fn read(bytes: Vec<u8>) -> Result<Found, Error> {
+    let damaged = |error: zip::result::ZipError| Error::Unreadable {
+        kind: " as a NumPy archive",
+        why: error.to_string(),
+        advice: "save it again with numpy.savez",
     };
     let mut archive = ZipArchive::new(Cursor::new(bytes)).map_err(damaged)?;
     if archive.len() > MOST_ARRAYS {
-        return Err(format!(
-            "has {} entries: keep to the matrices of the model",
-            archive.len()
-        ));
+        return Err(MatrixError::TooManyArrays(archive.len()).into());
     }
     let mut found = Found::new();
     for at in 0..archive.len() {
@@ -33,8 +33,8 @@ pub(super) fn read(bytes: Vec<u8>) -> Result<Found, String> {
     Ok(found)
 }
 
-fn dense(reader: impl Read) -> Result<DMatrix<f64>, String> {
-    let damaged = |error: std::io::Error| format!("cannot be read ({error}): save it again");
+fn dense(reader: impl Read) -> Result<DMatrix<f64>, EntryError> {
+    let damaged = |error: std::io::Error| EntryError::Unreadable(error.to_string());
     let file = NpyFile::new(reader).map_err(damaged)?;
     let shape: Vec<usize> = match file.shape() {
         [] => vec![1, 1],
@@ -54,18 +54,18 @@ fn dense(reader: impl Read) -> Result<DMatrix<f64>, String> {
 }
 
 /// The entries in the order of the file, whatever real type they have.
-fn numbers<R: Read>(file: NpyFile<R>) -> Result<Vec<f64>, String> {
+fn numbers<R: Read>(file: NpyFile<R>) -> Result<Vec<f64>, EntryError> {
     fn all<T: npyz::Deserialize, R: Read>(
         file: NpyFile<R>,
         number: impl Fn(T) -> f64,
-    ) -> Result<Vec<f64>, String> {
+    ) -> Result<Vec<f64>, EntryError> {
         let values: Vec<T> = file
             .into_vec()
-            .map_err(|error| format!("cannot be read ({error}): save it again"))?;
+            .map_err(|error| EntryError::Unreadable(error.to_string()))?;
         Ok(values.into_iter().map(number).collect())
     }
     let DType::Plain(kind) = file.dtype() else {
-        return Err("has fields: save plain matrices".into());
+        return Err(EntryError::Fields);
     };
     match (kind.type_char(), kind.size_field()) {
         (TypeChar::Float, 8) => all(file, |value: f64| value),
@@ -79,8 +79,6 @@ fn numbers<R: Read>(file: NpyFile<R>) -> Result<Vec<f64>, String> {
         (TypeChar::Uint, 2) => all(file, |value: u16| f64::from(value)),
         (TypeChar::Uint, 1) => all(file, |value: u8| f64::from(value)),
         (TypeChar::Bool, _) => all(file, |value: bool| f64::from(u8::from(value))),
-        _ => Err(format!(
-            "has entries of type {kind}: save real numbers, as float64"
-        )),
+        _ => Err(EntryError::Type(kind.to_string())),
     }
 }

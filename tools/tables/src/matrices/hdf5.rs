@@ -1,23 +1,24 @@
 //! MATLAB's 7.3 format: HDF5, with the dimensions of every array in reverse order.
 
 use super::{DEEPEST, Found, check_shape, from_columns};
+use crate::{EntryError, Error, MatrixError};
 use hdf5_pure::{Dataset, File, Group};
 use nalgebra::DMatrix;
 
 /// Where MATLAB keeps what variables refer to; no variable bears such a name.
 const INTERNAL: char = '#';
 
-pub(super) fn read(bytes: Vec<u8>) -> Result<Found, String> {
+pub(super) fn read(bytes: Vec<u8>) -> Result<Found, Error> {
     if end_of_file(&bytes).is_some_and(|end| end > bytes.len() as u64) {
-        return Err(
-            "is cut short, a MATLAB 7.3 file without its end: copy or save it again".into(),
-        );
+        return Err(MatrixError::CutShort.into());
     }
     let mut found = Found::new();
     File::from_bytes(bytes)
         .and_then(|file| add(&mut found, "", &file.root(), DEEPEST))
-        .map_err(|error| {
-            format!("cannot be read as a MATLAB 7.3 file ({error}): save it again, plain arrays or a structure of them")
+        .map_err(|error| Error::Unreadable {
+            kind: " as a MATLAB 7.3 file",
+            why: error.to_string(),
+            advice: "save it again, plain arrays or a structure of them",
         })?;
     Ok(found)
 }
@@ -31,7 +32,7 @@ fn add(
     for name in group.datasets()? {
         let matrix = group
             .dataset(&name)
-            .map_err(|error| format!("cannot be read ({error}): save it again"))
+            .map_err(|error| EntryError::Unreadable(error.to_string()))
             .and_then(|dataset| dense(&dataset));
         found.insert(format!("{prefix}{name}"), matrix);
     }
@@ -44,28 +45,24 @@ fn add(
     Ok(())
 }
 
-fn dense(dataset: &Dataset) -> Result<DMatrix<f64>, String> {
-    let blame = |error: hdf5_pure::Error| {
-        format!(
-            "is no real matrix ({error}): save it with full(...), as double, not in a cell or an object"
-        )
-    };
+fn dense(dataset: &Dataset) -> Result<DMatrix<f64>, EntryError> {
+    let not_real = |error: hdf5_pure::Error| EntryError::NotReal(Some(error.to_string()));
     let attributes = dataset.attrs().unwrap_or_default();
     if attributes.contains_key("MATLAB_empty") {
         return Ok(DMatrix::zeros(0, 0));
     }
     if attributes.contains_key("MATLAB_object_decode") {
-        return Err("is an object or a text: save plain matrices".into());
+        return Err(EntryError::Object);
     }
     let mut shape: Vec<usize> = dataset
         .shape()
-        .map_err(blame)?
+        .map_err(not_real)?
         .into_iter()
         .map(|size| usize::try_from(size).unwrap_or(usize::MAX))
         .collect();
     shape.reverse();
     check_shape(&shape)?;
-    from_columns(&shape, &dataset.read_f64().map_err(blame)?)
+    from_columns(&shape, &dataset.read_f64().map_err(not_real)?)
 }
 
 /// Where the file says that it ends: the address of HDF5's superblock, versions 0 to 3, with addresses of

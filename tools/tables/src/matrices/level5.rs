@@ -1,6 +1,7 @@
 //! MATLAB's level 5 format, which `save` writes unless told otherwise, and `scipy.io.savemat`.
 
 use super::{DEEPEST, Found, check_shape, from_columns};
+use crate::{EntryError, Error};
 use matrw::{MatVariable, MatlabType, load_matfile_from_u8};
 use nalgebra::DMatrix;
 
@@ -8,15 +9,18 @@ use nalgebra::DMatrix;
 /// reader wants it. The text says who wrote the file and when, and nothing else.
 const HEAD: &[u8] = b"MATLAB 5.0 MAT-file, ";
 
-pub(super) fn read(bytes: &[u8]) -> Result<Found, String> {
+pub(super) fn read(bytes: &[u8]) -> Result<Found, Error> {
     let mut bytes = bytes.to_vec();
     if let Some(head) = bytes.get_mut(..HEAD.len()) {
         head.copy_from_slice(HEAD);
     }
     let file = load_matfile_from_u8(&bytes).map_err(|error| {
         let what = error.to_string();
-        let what = what.lines().next().unwrap_or_default().trim();
-        format!("cannot be read as a MATLAB file ({what}): save it again, plain arrays or a structure of them")
+        Error::Unreadable {
+            kind: " as a MATLAB file",
+            why: what.lines().next().unwrap_or_default().trim().to_string(),
+            advice: "save it again, plain arrays or a structure of them",
+        }
     })?;
     let mut found = Found::new();
     for (name, variable) in file.iter() {
@@ -38,16 +42,14 @@ fn add(found: &mut Found, name: &str, variable: &MatVariable, depth: usize) {
             }
         }
         _ => {
-            let what =
-                "is no real matrix: save it with full(...), as double, not in a cell or an object";
-            found.insert(name.to_string(), Err(what.into()));
+            found.insert(name.to_string(), Err(EntryError::NotReal(None)));
         }
     }
 }
 
-fn dense(variable: &MatVariable) -> Result<DMatrix<f64>, String> {
+fn dense(variable: &MatVariable) -> Result<DMatrix<f64>, EntryError> {
     if variable.is_complex() == Some(true) {
-        return Err("is complex: save real matrices".into());
+        return Err(EntryError::Complex);
     }
     let shape = variable.dim();
     check_shape(&shape)?;
@@ -55,7 +57,7 @@ fn dense(variable: &MatVariable) -> Result<DMatrix<f64>, String> {
 }
 
 /// The entries column by column, whatever class MATLAB gave them.
-fn entries(variable: &MatVariable) -> Result<Vec<f64>, String> {
+fn entries(variable: &MatVariable) -> Result<Vec<f64>, EntryError> {
     fn all<T>(values: Option<Vec<T>>, number: impl Fn(T) -> f64) -> Option<Vec<f64>> {
         values.map(|values| values.into_iter().map(number).collect())
     }
@@ -75,5 +77,5 @@ fn entries(variable: &MatVariable) -> Result<Vec<f64>, String> {
         }
         _ => None,
     };
-    values.ok_or_else(|| "is a text, not a matrix: name another variable".into())
+    values.ok_or(EntryError::Text)
 }
