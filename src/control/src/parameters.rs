@@ -211,6 +211,14 @@ pub struct Estimator {
     pub largest_fault: Vec<f64>,
 }
 
+impl Estimator {
+    /// The largest fault estimate of each sensor (p), output units.
+    pub fn authority(&self) -> &[f64] {
+        let hypotheses = self.hypotheses.as_ref();
+        hypotheses.map_or(&self.largest_fault, |settings| &settings.authority)
+    }
+}
+
 /// What is done about a divergence that could be a sensor's drift or a load.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]

@@ -15,6 +15,8 @@ const SHARE_UNJUDGED: f64 = 0.25;
 
 /// Share of the samples of a run in which an input may be at a limit without a warning.
 const SHARE_SATURATED: f64 = 0.05;
+/// Share of the samples of a run in which a fault estimate may stand at its largest size without a warning.
+const SHARE_CAPPED: f64 = 0.01;
 /// Standard deviation of a command's noise, relative to its range, without a warning.
 const COMMAND_NOISE: f64 = 0.1;
 
@@ -42,6 +44,16 @@ pub enum RunWarning {
         input: usize,
         /// Share of the samples, 0 to 1.
         share: f64,
+    },
+    /// The estimate of a sensor's fault stood at its largest size: the fault may be larger, and is then only
+    /// partly taken out.
+    Capped {
+        /// The sensor, from 0.
+        sensor: usize,
+        /// Share of the samples, 0 to 1.
+        share: f64,
+        /// That size in physical units.
+        size: f64,
     },
     /// The noise of the sensors alone moves a command by a large part of its range.
     NoisyCommand {
@@ -82,6 +94,7 @@ pub fn of_runs(design: &Design, runs: &[Trajectory]) -> Vec<RunWarning> {
     unstable(design)
         .chain(unjudged)
         .chain(saturated)
+        .chain(ftc.into_iter().flat_map(|run| capped(design, run)))
         .chain(noisy_commands(design))
         .chain(stopped)
         .chain(diodes)
@@ -113,6 +126,21 @@ fn saturated(design: &Design, run: &Trajectory) -> Vec<RunWarning> {
         .filter(|(_, share)| *share > SHARE_SATURATED)
         .map(|(input, share)| RunWarning::Saturated { input, share })
         .collect()
+}
+
+/// Sensors whose fault estimate stands at its largest size in many samples of a run.
+fn capped<'a>(design: &'a Design, run: &'a Trajectory) -> impl Iterator<Item = RunWarning> + 'a {
+    let samples = run.records.len().max(1) as f64;
+    let limits = design.controller.estimator.authority().iter().enumerate();
+    limits.filter_map(move |(sensor, &size)| {
+        let at_limit = |record: &&Record| record.f_hat[sensor].abs() >= size;
+        let share = run.records.iter().filter(at_limit).count() as f64 / samples;
+        (share > SHARE_CAPPED).then_some(RunWarning::Capped {
+            sensor,
+            share,
+            size,
+        })
+    })
 }
 
 /// Commands that the noise of the sensors moves by a large part of their range (or nominal value).

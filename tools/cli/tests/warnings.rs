@@ -302,6 +302,26 @@ fn an_input_at_its_limits_and_a_noisy_command_are_named() {
 }
 
 #[test]
+fn a_fault_beyond_the_authority_is_named() {
+    let estimator = SOUND.find("[estimator]").unwrap()..SOUND.find("[compensation]").unwrap();
+    let within = |authority: f64| {
+        let mut design = SOUND.to_string();
+        let keys = format!("[estimator]\nauthority = [5.0, {authority}]\n\n");
+        design.replace_range(estimator.clone(), &keys);
+        of_run(&Bench::new(design), &[])
+    };
+    one(
+        &within(0.2),
+        &[
+            "ftc: in ",
+            "% of the samples the estimated fault of b stood at its largest size, 0.2",
+            "raise estimator.authority",
+        ],
+    );
+    assert!(within(1.0).is_empty());
+}
+
+#[test]
 fn weights_without_effect_are_named() {
     let decay = damaged("decay = 0.7\n", "decay = 0.7\nobjective = \"decay\"\n");
     one(

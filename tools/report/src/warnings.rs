@@ -273,6 +273,21 @@ fn of_run(design: &Design, calmer: &str, warning: &RunWarning) -> String {
             inputs[input].name,
             percent(share)
         ),
+        RunWarning::Capped {
+            sensor,
+            share,
+            size,
+        } => format!(
+            "ftc: in {} the estimated fault of {} stood at its largest size, {}: a larger fault is taken out only in \
+             part; {}",
+            percent(share),
+            design.signals.outputs[sensor].name,
+            number(size),
+            match design.controller.estimator.hypotheses {
+                Some(_) => "raise estimator.authority",
+                None => "widen the output's min and max",
+            }
+        ),
         RunWarning::NoisyCommand { input, deviation } => format!(
             "ftc: the noise of the sensors moves {} by {} (standard deviation), more than a tenth of its range: \
              {calmer}, or a slower observer.decay",

@@ -40,10 +40,7 @@ impl EstimatorState {
         y: &[f64],
         dy: &[f64],
     ) {
-        let limits = estimator
-            .hypotheses
-            .as_ref()
-            .map_or(&estimator.largest_fault, |settings| &settings.authority);
+        let limits = estimator.authority();
         kernel::copy(&mut self.prediction, &bank.expected);
         let sensors = self
             .residual

@@ -231,10 +231,7 @@ impl EstimatorState {
 
     /// Takes over what the state-based estimator said of the readings `y` (p).
     pub(crate) fn adopt(&mut self, estimator: &Estimator, bank: &BankState, y: &[f64]) {
-        let limits = estimator
-            .hypotheses
-            .as_ref()
-            .map_or(&estimator.largest_fault, |settings| &settings.authority);
+        let limits = estimator.authority();
         kernel::copy(&mut self.prediction, &bank.expected);
         self.judged.fill(true);
         let sensors = self
