@@ -76,7 +76,7 @@ fn check_scaled(
     let models = augment(plant, spec, &units);
     for (index, (model, mode)) in models.iter().zip(&plant.modes).enumerate() {
         let number = index + 1;
-        for eigenvalue in mode.a.complex_eigenvalues().iter() {
+        for eigenvalue in ftc_plant::eigenvalues(&mode.a).iter() {
             if eigenvalue.norm() >= spec.decay && !is_movable(model, *eigenvalue) {
                 return Err(Uncontrollable::Eigenvalue {
                     mode: number,

@@ -75,7 +75,7 @@ impl SwitchedPlant {
     /// of sampled ones hardly ever: in the closed left half plane, and not all of them at zero.
     pub fn looks_continuous(&self) -> bool {
         self.modes.iter().all(|mode| {
-            let eigenvalues = mode.a.complex_eigenvalues();
+            let eigenvalues = crate::eigenvalues(&mode.a);
             let size = eigenvalues.iter().map(|l| l.norm()).fold(0.0, f64::max);
             let left = eigenvalues.iter().all(|l| l.re <= NEGLIGIBLE * size);
             left && eigenvalues.iter().any(|l| l.re < -NEGLIGIBLE * size)

@@ -34,6 +34,7 @@
 mod continuous;
 pub mod deviation;
 mod dimensions;
+mod eigenvalues;
 mod error;
 pub mod noise;
 pub mod rectifier;
@@ -44,6 +45,7 @@ mod true_plant;
 
 pub use deviation::Deviation;
 pub use dimensions::Dimensions;
+pub use eigenvalues::{eigenvalues, spectral_radius};
 pub use error::PlantError;
 pub use scenario::Scenario;
 pub use true_plant::TruePlant;
@@ -152,13 +154,4 @@ impl SwitchedPlant {
             disturbances: mode.e.ncols(),
         }
     }
-}
-
-/// The largest magnitude of an eigenvalue of a square matrix.
-pub fn spectral_radius(matrix: &DMatrix<f64>) -> f64 {
-    matrix
-        .complex_eigenvalues()
-        .iter()
-        .map(|lambda| lambda.norm())
-        .fold(0.0, f64::max)
 }

@@ -1136,7 +1136,7 @@ fn keys_inside_kinds() {
             "a fault of a sensor and an input",
             event,
             "kind = \"stuck\", from = 50, sensor = 1, input = 1",
-            &["scenario.events[1]: sensor and input are both given"],
+            &["scenario.events[1]: input does not say where this fault is: give sensor alone"],
         ),
         (
             "a period that is a text",

@@ -111,11 +111,17 @@ impl Event {
         })
     }
 
-    /// Which sensor or actuator fails: `sensor` and `input` mean the same here.
+    /// Which sensor or which input's actuator fails.
     fn place(&self, what: &str) -> Result<&Which, String> {
-        match (&self.sensor, &self.input) {
-            (Some(place), None) | (None, Some(place)) => Ok(place),
-            (Some(_), Some(_)) => Err(format!("sensor and input are both given: keep {what}")),
+        let (own, other, others) = match what {
+            "input" => (&self.input, "sensor", &self.sensor),
+            _ => (&self.sensor, "input", &self.input),
+        };
+        match (own, others) {
+            (_, Some(_)) => Err(format!(
+                "{other} does not say where this fault is: give {what} alone"
+            )),
+            (Some(place), None) => Ok(place),
             (None, None) => Err(format!("{what} is missing: add its number or its name")),
         }
     }

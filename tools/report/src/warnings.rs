@@ -73,7 +73,8 @@ fn idle_weights(file: &DesignFile, design: &Design) -> Option<String> {
             "the disturbance can be rejected completely, whatever they are"
         }
     };
-    (!names.is_empty()).then(|| format!("{} have no effect: {reason}", names.join(", ")))
+    let have = if names.len() == 1 { "has" } else { "have" };
+    (!names.is_empty()).then(|| format!("{} {have} no effect: {reason}", names.join(", ")))
 }
 
 /// What each weight contributes to the performance signal.

@@ -101,7 +101,7 @@ impl LeastSquares {
         kernel::dot(&self.direction, regressor).max(0.0)
     }
 
-    /// One step under the regressor that was aimed at; `leverage` is its. Older samples keep the
+    /// One step under the regressor that was aimed at; `leverage` is that regressor's. Older samples keep the
     /// weight `keep`, in (0, 1]. `error` tells for each signal, in order, by how much its coefficients
     /// were wrong.
     pub fn learn(&mut self, leverage: f64, keep: f64, mut error: impl FnMut(&[f64]) -> f64) {

@@ -9,7 +9,10 @@ use nalgebra::{Complex, DMatrix};
 /// The magnitude of the eigenvalue that no gain can move.
 pub(crate) fn check_detectable(a: &DMatrix<f64>, c: &DMatrix<f64>, decay: f64) -> Result<(), f64> {
     let n = a.nrows();
-    for lambda in a.complex_eigenvalues().iter() {
+    for lambda in ftc_plant::eigenvalues(a).iter() {
+        if !lambda.norm().is_finite() {
+            return Err(f64::INFINITY);
+        }
         if lambda.norm() < decay {
             continue;
         }

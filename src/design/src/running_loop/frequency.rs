@@ -43,7 +43,7 @@ impl Response {
         let (b, c) = (basis.tr_mul(b), (c * &basis).transpose());
         let columns = |matrix: &DMatrix<f64>| matrix.column_iter().map(|x| x.into()).collect();
         Self {
-            poles: reduced.complex_eigenvalues().iter().copied().collect(),
+            poles: ftc_plant::eigenvalues(&reduced).iter().copied().collect(),
             a: reduced.transpose().as_slice().to_vec(),
             b: columns(&b),
             c: columns(&c),
