@@ -430,10 +430,21 @@ pub fn json(whole: &Partial, asked: u64) -> Value {
 pub fn read(text: &str) -> Result<Partial, ReadError> {
     let value: Value = serde_json::from_str(text)?;
     let whole = value.get("campaign").cloned().unwrap_or_default();
-    Ok(serde_json::from_value(whole)?)
+    let known = whole.is_object();
+    serde_json::from_value(whole).map_err(|error| match known {
+        true => ReadError::Other(error),
+        false => ReadError::No(error),
+    })
 }
 
-/// What was read is no result of a campaign.
+/// What was read is no result of a campaign, or one of another version.
 #[derive(Debug, thiserror::Error)]
-#[error("is no result of a campaign ({0}): name a campaign.json")]
-pub struct ReadError(#[from] serde_json::Error);
+#[non_exhaustive]
+pub enum ReadError {
+    /// Something else.
+    #[error("is no result of a campaign ({0}): name a campaign.json")]
+    No(#[from] serde_json::Error),
+    /// Its fields are not today's.
+    #[error("was written by another version, or changed since ({0}): run the campaign again")]
+    Other(#[source] serde_json::Error),
+}

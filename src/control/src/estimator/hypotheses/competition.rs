@@ -7,10 +7,7 @@ use alloc::vec;
 use alloc::vec::Vec;
 use serde::{Deserialize, Serialize};
 
-/// How far below the best a hypothesis may fall before it is dropped, in log likelihood: the price of a
-/// fault at the usual rate and the odds of an accusation together.
-const MARGIN: f64 = 15.0;
-/// How far the explanation without sensor faults may fall: it is never forgotten.
+/// How far the explanation by the model and healthy sensors may fall: it is never forgotten.
 const MEMORY: f64 = 30.0;
 /// Hypotheses about the same sensors.
 const ALIKE: usize = 2;
@@ -212,6 +209,8 @@ impl Bank {
             .filter(|c| c.convinced)
             .map(|c| c.score)
             .fold(f64::NEG_INFINITY, f64::max);
+        // What has fallen further than a new fault costs, and the odds of an accusation, is dropped.
+        let margin = self.settings.odds - self.prices.fault.min(self.prices.load);
         let mut kept = 0;
         let mut plain = false;
         for index in 0..state.candidates.count {
@@ -219,7 +218,7 @@ impl Bank {
             let kind = self.kind(state, &candidate);
             let unaccused = kind == (0, false);
             let room = KEEP - usize::from(!plain);
-            let stays = candidate.score >= best - MARGIN && kept < room;
+            let stays = candidate.score >= best - margin && kept < room;
             if !stays && (plain || !unaccused) {
                 continue;
             }
