@@ -48,3 +48,25 @@ fn a_slow_mode() {
 fn an_unstable_mode() {
     served("[[1.02, 0.1], [0.0, 0.9]]");
 }
+
+/// Poles on which a QR iteration without an end once turned for ever.
+#[test]
+fn poles_that_are_equal_or_in_order() {
+    let equal = |_| 0.8;
+    let ordered = |row: usize| 0.7 + 0.013 * row as f64;
+    let designs: [(usize, &dyn Fn(usize) -> f64); 3] = [(4, &equal), (6, &equal), (16, &ordered)];
+    for (n, pole) in designs {
+        let diagonal = |entry: &dyn Fn(usize) -> f64| {
+            let row = |r| (0..n).map(move |c| if r == c { entry(r) } else { 0.0 });
+            let rows: Vec<Vec<f64>> = (0..n).map(|r| row(r).collect()).collect();
+            format!("{rows:?}")
+        };
+        let (a, one) = (diagonal(pole), diagonal(&|_| 1.0));
+        let bench = Bench::new(format!(
+            "name = \"poles\"\nsample_time = 1.0\n[[mode]]\nA = {a}\nB = {one}\nC = {one}\n\
+             [controller]\nobjective = \"decay\"\n"
+        ));
+        let run = bench.run(&["design", FILE]);
+        assert_eq!(run.code(), 0, "{}", run.stderr());
+    }
+}
