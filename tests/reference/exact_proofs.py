@@ -1,4 +1,6 @@
-"""Proves the claims of many random plants in rational arithmetic; ends with exit code 1 where one is not proved.
+"""Proves the claims of many random plants in rational arithmetic.
+
+Ends with exit code 1 where one is not proved, or no plant is designed.
 
 `make bench` runs it; `test_exact_proof.py` holds the same checks on examples and a few plants.
 """
@@ -41,7 +43,7 @@ def main() -> int:
             except AssertionError:
                 missed.append(f"seed {seed}: {check.__doc__}")
     print(f"{designed} of {arguments.plants} random plants designed; not proved: {missed or 'nothing'}")
-    return 1 if missed else 0
+    return 1 if missed or not designed else 0
 
 
 if __name__ == "__main__":

@@ -105,6 +105,27 @@ impl From<Synthesis> for Proof {
 }
 
 impl Proof {
+    /// Samples for longer than which modes must last on average, for feedback and observer both; none where
+    /// modes may change at any sample.
+    pub fn dwell(&self) -> Option<f64> {
+        let dwell = [self.state_feedback.dwell, self.observer.dwell];
+        let samples = dwell.iter().flatten().map(|dwell| dwell.samples);
+        samples.reduce(f64::max)
+    }
+
+    /// Samples that each mode must last for where bumpless transfer needs that: as transfer needs, and longer
+    /// than [`dwell`](Self::dwell).
+    pub fn shortest_mode(&self) -> Option<usize> {
+        let transfer = self.running_loop.transfer.as_ref()?;
+        // The cast saturates.
+        let longer = self
+            .dwell()
+            .map_or(0, |samples| samples.floor() as usize + 1);
+        transfer
+            .needs_dwell()
+            .then(|| transfer.samples().max(longer))
+    }
+
     /// What is proved: these claims of this controller.
     pub(crate) fn of(
         self,

@@ -209,19 +209,14 @@ impl ModeDurations {
 
     /// Where modes must last for bumpless transfer, each must.
     fn too_short_for_transfer(&self, design: &Design) -> Option<Warning> {
-        let proof = design.proof.as_ref()?;
-        let transfer = proof.running_loop.transfer.as_ref()?;
-        let needed = transfer.needs_dwell().then(|| transfer.samples() as u64)?;
+        let needed = design.proof.as_ref()?.shortest_mode()? as u64;
         let shortest = self.0.iter().copied().min()?;
         (shortest < needed).then_some(Warning::ModesTooShortForTransfer { shortest, needed })
     }
 
     /// Stability under `dwell` is proved for modes that last.
     fn too_short_to_be_proved(&self, design: &Design) -> Option<Warning> {
-        let proof = design.proof.as_ref()?;
-        let proved = [proof.state_feedback.dwell, proof.observer.dwell];
-        let needed = proved.iter().flatten().map(|dwell| dwell.samples);
-        let needed = needed.reduce(f64::max)?;
+        let needed = design.proof.as_ref()?.dwell()?;
         let count = self.0.len();
         let mean = self.0.iter().sum::<u64>() as f64 / count.max(1) as f64;
         (count > 0 && mean <= needed).then_some(Warning::ModesTooShortToBeProved { mean, needed })

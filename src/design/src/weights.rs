@@ -10,8 +10,8 @@ use crate::state_feedback::{StateFeedback, scaled_gain};
 use ftc_plant::SwitchedPlant;
 use nalgebra::DMatrix;
 
-/// Part of the performance signal, by l2 gain, below which a weight counts as idle: it then takes part in
-/// less than half a percent of the signal's energy.
+/// Part of the performance signal, by l2 gain, below which a weight counts as idle: the square of its gain is
+/// then less than half a percent of that of the whole.
 const IDLE: f64 = 0.07;
 
 /// One of the weights of (T2).

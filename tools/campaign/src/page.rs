@@ -153,6 +153,13 @@ fn distribution(name: &str, histogram: &Histogram, scale: fn(f64) -> f64) -> Ser
     Series::new(name, points).step()
 }
 
+/// The distribution of true errors over those without fault tolerance.
+fn over_none(histogram: &Histogram) -> Series {
+    distribution("over none", histogram, f64::log10)
+        .ink(Ink::Vermilion)
+        .dash(Dash::Dashed)
+}
+
 fn errors(statistics: &Statistics) -> Section {
     let share = "runs up to this (%)";
     let absolute = Figure::new(
@@ -186,11 +193,7 @@ fn errors(statistics: &Statistics) -> Section {
         "log10 of the ratio of true errors",
         share,
     )
-    .with(
-        distribution("over none", &statistics.over_none, f64::log10)
-            .ink(Ink::Vermilion)
-            .dash(Dash::Dashed),
-    )
+    .with(over_none(&statistics.over_none))
     .with(distribution(
         "over told the fault",
         &statistics.over_told,
@@ -226,11 +229,7 @@ fn healthy(statistics: &Statistics) -> Section {
         "log10 of the ratio of true errors",
         "runs up to this (%)",
     )
-    .with(
-        distribution("over none", &healthy.over_none, f64::log10)
-            .ink(Ink::Vermilion)
-            .dash(Dash::Dashed),
-    );
+    .with(over_none(&healthy.over_none));
     let table = Table {
         caption: "Quantiles: so many of the runs without a fault have at most this".into(),
         columns: quantile_columns(),

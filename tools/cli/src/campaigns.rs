@@ -147,7 +147,7 @@ fn replay(mut made: Made, arguments: &Arguments, run: u64) -> Result<String, Fai
     let drawn = campaign::draw(&made.design, &arguments.options(), run);
     made.design.scenario = drawn.scenario;
     made.design.true_plant = drawn.truth;
-    crate::simulate(made, &arguments.out, false)
+    crate::simulate(made, &arguments.design, &arguments.out, false)
 }
 
 /// Reads the results of shards and puts them together.

@@ -332,7 +332,7 @@ fn run(
                 ),
                 false => "simulating".into(),
             });
-            simulate(made, out, *baselines)
+            simulate(made, design, out, *baselines)
         }
         Command::Campaign(campaign) => {
             campaign.check()?;
@@ -436,9 +436,9 @@ fn beside_program() -> Result<PathBuf, Failure> {
 }
 
 /// Simulates a design and writes what was found.
-fn simulate(made: Made, out: &Path, baselines: bool) -> Result<String, Failure> {
+fn simulate(made: Made, file: &Path, out: &Path, baselines: bool) -> Result<String, Failure> {
     let found = report::simulate::simulate(&made.design, made.warnings, baselines)
-        .map_err(|error| Failure::Input(error.to_string()))?;
+        .map_err(|error| Failure::Input(format!("{}: {error}", file.display())))?;
     let staging = Staging::new(out).map_err(Failure::output_directory)?;
     staging
         .add_written(report::simulate::TABLE, |file| {

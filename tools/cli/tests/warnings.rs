@@ -510,9 +510,21 @@ fn bumpless_transfer_says_how_often() {
         "{ from = 30, mode = 2 }]",
         "{ from = 2, mode = 2 }, { from = 50, mode = 1 }]",
     );
-    let warnings = of_design(&Bench::new(hasty));
-    let short = |warning: &String| {
+    let bench = Bench::new(hasty);
+    let warnings = of_design(&bench);
+    let short = |warning: &&String| {
         warning.contains("a mode lasts 2 samples only") && warning.contains("controller.bumpless")
     };
-    assert!(warnings.iter().any(short), "{warnings:?}");
+    let warned = warnings.iter().find(short);
+    let warned = warned.unwrap_or_else(|| panic!("{warnings:?}"));
+    // The length that is warned of is the one that is claimed.
+    let report = bench.run(&["design", FILE]).stdout();
+    let length = |text: &str, before: &str| -> u64 {
+        let (_, after) = text.split_once(before).unwrap();
+        after.split([' ', ':']).next().unwrap().parse().unwrap()
+    };
+    assert_eq!(
+        length(warned, "each lasts at least "),
+        length(&report, "proved when each mode lasts at least ")
+    );
 }

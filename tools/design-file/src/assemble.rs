@@ -334,11 +334,12 @@ fn tracked(
     let mut tracked = Vec::new();
     for which in given {
         let output = which
-            .index("controller.tracked:", &names, "outputs")
-            .map_err(|what| {
-                what.to_string()
-                    .replace(": is", " contains an entry that is")
-            })?;
+            .index(
+                "controller.tracked contains an entry that",
+                &names,
+                "outputs",
+            )
+            .map_err(|what| what.to_string())?;
         if tracked.contains(&output) {
             return Err(format!(
                 "controller.tracked names output {which} twice: name each output once"

@@ -19,7 +19,8 @@ pub fn options(py: Python<'_>, text: &str, design: &ftc_design::Design) -> PyRes
     let options: Options = serde_json::from_str(text)
         .map_err(|error| errors::of_sentence(py, format!("campaign: {error}")))?;
     // A key that is left out has a default; one that is there is meant.
-    let said = text.contains("\"model_error\"");
+    let given: serde_json::Value = serde_json::from_str(text).unwrap_or_default();
+    let said = given.get("model_error").is_some();
     options
         .check()
         .and_then(|()| match said {

@@ -65,17 +65,11 @@ pub fn bumpless(proved: &TransferCertificate) -> String {
 
 /// Under which switching the running loop is proved stable.
 pub fn stability(proof: &Proof) -> String {
-    if let Some(transfer) = &proof.running_loop.transfer {
-        return with_transfer(proof, transfer);
+    if proof.running_loop.transfer.is_some() {
+        return with_transfer(proof);
     }
-    let dwell = [proof.state_feedback.dwell, proof.observer.dwell];
-    let longest = dwell
-        .iter()
-        .flatten()
-        .map(|dwell| dwell.samples)
-        .reduce(f64::max);
     let decay = proof.state_feedback.decay.max(proof.observer.spec.decay);
-    match longest {
+    match proof.dwell() {
         None => {
             format!("proved under arbitrary switching, any decay slower than {decay} per sample")
         }
@@ -86,29 +80,19 @@ pub fn stability(proof: &Proof) -> String {
 }
 
 /// The same with bumpless transfer, whose proof has a rate within a mode only.
-fn with_transfer(proof: &Proof, transfer: &TransferCertificate) -> String {
+fn with_transfer(proof: &Proof) -> String {
     let decay = proof.state_feedback.decay.max(proof.observer.spec.decay);
     let within = format!(
         "any decay slower than {} per sample within a mode",
         decay.max(TRANSFER_DECAY)
     );
-    match transfer.needs_dwell() {
-        true => format!(
+    match proof.shortest_mode() {
+        Some(samples) => format!(
             "proved when each mode lasts at least {}, {within}",
-            count(shortest_mode(proof, transfer), "sample")
+            count(samples, "sample")
         ),
-        false => format!("proved under arbitrary switching with bumpless transfer, {within}"),
+        None => format!("proved under arbitrary switching with bumpless transfer, {within}"),
     }
-}
-
-/// Samples that each mode must last for: as bumpless transfer needs, and longer than the proofs of feedback
-/// and observer need.
-fn shortest_mode(proof: &Proof, transfer: &TransferCertificate) -> usize {
-    let dwell = [proof.state_feedback.dwell, proof.observer.dwell];
-    let longest = dwell.iter().flatten().map(|dwell| dwell.samples);
-    let longest = longest.fold(0.0, f64::max);
-    // The cast saturates.
-    transfer.samples().max(longest.floor() as usize + 1)
 }
 
 /// The sentence an engineer wants first: "Survives the loss of level 1; survives both by the model

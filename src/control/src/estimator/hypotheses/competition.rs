@@ -19,8 +19,6 @@ pub(super) const TOGETHER: f64 = 1.5;
 pub(super) const UNLIKE: f64 = 2.0;
 /// Price of a fault before the first sample: one sensor in a hundred.
 pub(super) const AT_START: f64 = -4.6;
-/// Variance of loads and input gains that are said to be gone, relative to that of their jumps.
-const REMAINS: f64 = 0.01;
 /// Mean of the relative error of a sensor's wrong gain.
 pub(super) const SCALE_MEAN: f64 = -0.5;
 /// Its variance.
@@ -238,10 +236,8 @@ impl Bank {
         state.candidates.count = kept;
     }
 
+    /// The candidates that stay become the hypotheses in competition.
     fn instantiate(&self, state: &mut BankState, model: &ModeModel, reading: Reading<'_>) {
-        let layout = self.layout;
-        let Layout { n, p, .. } = layout;
-        let bias = self.output_error();
         let mut next = Live::NONE;
         // Children first: they start from their parents' predictions.
         let mut free = 0;
@@ -255,146 +251,46 @@ impl Bank {
                 free += 1;
             }
             next.add(free);
-            let (parent, child) = pair(&mut state.slots, candidate.parent, free);
-            child.take(parent);
-            let kinds = self.sets(child, candidate.action);
-            (child.additive, child.stuck, child.scaled) =
-                (kinds.additive, kinds.stuck, kinds.scaled);
-            match candidate.action {
-                Action::Loosen => child.loose = true,
-                Action::Tighten => child.loose = false,
-                _ => {}
-            }
-            let fault = layout.fault();
-            match candidate.action {
-                Action::Load(jump) => {
-                    let jump = &model.jumps[jump];
-                    child.jump(layout, model, jump, &state.u, self.settings.gain_error);
-                }
-                Action::Accuse(set) | Action::Change(set) => {
-                    for q in 0..p {
-                        if !has(set, q) {
-                            continue;
-                        }
-                        let (k, stride) = (fault + q, layout.stride());
-                        let variance = self.settings.fault_size[q] * self.settings.fault_size[q];
-                        if has(parent.stuck | parent.scaled, q)
-                            || (!bias && !has(parent.additive, q))
-                        {
-                            child.open(k, 0.0, variance);
-                        } else {
-                            child.cov[k * stride + k] += variance;
-                        }
-                    }
-                }
-                Action::Release(set) => {
-                    for q in 0..p {
-                        if has(set, q) {
-                            child.open(
-                                fault + q,
-                                0.0,
-                                if bias {
-                                    model.bias[q]
-                                        * self.settings.model_error
-                                        * self.settings.model_error
-                                } else {
-                                    0.0
-                                },
-                            );
-                        }
-                    }
-                }
-                Action::Freeze(q) => {
-                    let variance = reading.noise[q] * reading.noise[q] / state.count[q].max(1.0);
-                    child.open(fault + q, state.mean[q], variance);
-                }
-                Action::Scale(q) => child.open(fault + q, SCALE_MEAN, SCALE_VARIANCE),
-                Action::Start => {
-                    let stride = layout.stride();
-                    for (k, sd) in self.settings.start_elsewhere.iter().enumerate() {
-                        child.cov[k * stride + k] += sd * sd;
-                    }
-                }
-                Action::Home | Action::Drift(_) => {
-                    for k in 0..n {
-                        let variance = state.own.variance(model, &self.settings, k);
-                        child.open(k, state.own.x[k], variance);
-                        child.before[k] = state.own.x[k];
-                    }
-                    for (k, size) in model.load_size.iter().enumerate() {
-                        child.open(layout.load() + k, 0.0, REMAINS * size * size);
-                    }
-                    let gain = self.settings.gain_error;
-                    for k in layout.gain()..fault {
-                        child.open(k, 0.0, REMAINS * gain * gain);
-                    }
-                    for q in 0..p {
-                        if has(child.additive, q) {
-                            child.open(
-                                fault + q,
-                                0.0,
-                                self.settings.fault_size[q] * self.settings.fault_size[q],
-                            );
-                        } else {
-                            child.open(
-                                fault + q,
-                                0.0,
-                                if bias {
-                                    model.bias[q]
-                                        * self.settings.model_error
-                                        * self.settings.model_error
-                                } else {
-                                    0.0
-                                },
-                            );
-                        }
-                    }
-                }
-                Action::Loosen => {
-                    let (load, stride) = (layout.load() + layout.state_load(), layout.stride());
-                    for (i, v) in self.looseness(model, parent, &state.u).enumerate() {
-                        for (row, column) in
-                            [(i, i), (i, load + i), (load + i, i), (load + i, load + i)]
-                        {
-                            child.cov[row * stride + column] += v;
-                        }
-                    }
-                }
-                Action::Stay | Action::Tighten => {}
-            }
-            let seen = &mut state.seen[free];
-            let child = &state.slots[free];
-            seen.predict(layout, model, reading, child, child.kinds(), bias);
-            seen.whiten(p);
+            self.take_effect(state, candidate, free, model, reading);
+            let (seen, child) = (&mut state.seen[free], &state.slots[free]);
+            seen.predict(self.layout, model, reading, child, self.output_error());
+            seen.whiten(self.layout.p);
         }
         for index in 0..state.candidates.count {
-            let slot = usize::from(next.list[index]);
-            let candidate = state.candidates.list[index];
-            let h = &mut state.slots[slot];
-            h.update(layout, &mut state.seen[slot], bias);
-            h.score = candidate.score;
-            let price = match candidate.action {
-                Action::Stay | Action::Tighten | Action::Release(_) => 0.0,
-                Action::Load(_) | Action::Loosen => 0.0,
-                Action::Accuse(_)
-                | Action::Scale(_)
-                | Action::Freeze(_)
-                | Action::Start
-                | Action::Home
-                | Action::Drift(_) => -2.0 * self.prices.fault,
-                Action::Change(_) => -2.0 * self.prices.change,
-            };
-            h.misfit += RENEWED * (state.seen[slot].square.min(1e3) + price - h.misfit);
-            h.convinced = candidate.convinced;
+            self.learn_from(state, usize::from(next.list[index]), index);
         }
         state.live = next;
-        // Whom to believe: an accusation must beat the best explanation without one by its odds.
+        self.believe(state, reading);
+    }
+
+    /// The hypothesis in `slot`, which comes of the candidate `index`, takes the sample in.
+    fn learn_from(&self, state: &mut BankState, slot: usize, index: usize) {
+        let candidate = state.candidates.list[index];
+        let h = &mut state.slots[slot];
+        h.update(self.layout, &mut state.seen[slot], self.output_error());
+        h.score = candidate.score;
+        let price = match candidate.action {
+            Action::Stay | Action::Tighten | Action::Release(_) => 0.0,
+            Action::Load(_) | Action::Loosen => 0.0,
+            Action::Accuse(_)
+            | Action::Scale(_)
+            | Action::Freeze(_)
+            | Action::Start
+            | Action::Home
+            | Action::Drift(_) => -2.0 * self.prices.fault,
+            Action::Change(_) => -2.0 * self.prices.change,
+        };
+        h.misfit += RENEWED * (state.seen[slot].square.min(1e3) + price - h.misfit);
+        h.convinced = candidate.convinced;
+    }
+
+    /// Whom to believe: an accusation must beat the best explanation without one by its odds.
+    fn believe(&self, state: &mut BankState, reading: Reading<'_>) {
+        let (p, fault) = (self.layout.p, self.layout.fault());
         let mut best = state.live.first();
         let mut top = f64::NEG_INFINITY;
-        let mut most = f64::NEG_INFINITY;
         for slot in state.live.slots() {
             let h = &state.slots[slot];
-            most = most.max(h.score);
             let value = if h.accused() == 0 || self.settings.trusts_model() {
                 h.score
             } else {
@@ -418,8 +314,7 @@ impl Bank {
             }
             for q in 0..p {
                 if has(h.accused() & !decided, q)
-                    && (!has(h.additive, q)
-                        || h.z[layout.fault() + q].abs() > 6.0 * reading.noise[q])
+                    && (!has(h.additive, q) || h.z[fault + q].abs() > 6.0 * reading.noise[q])
                 {
                     state.suspect |= 1 << q;
                 }
@@ -427,16 +322,5 @@ impl Bank {
         }
         // The best leads.
         state.live.lead(best);
-    }
-}
-
-/// Two different slots at once.
-fn pair(slots: &mut [Hypothesis], from: usize, to: usize) -> (&Hypothesis, &mut Hypothesis) {
-    if from < to {
-        let (a, b) = slots.split_at_mut(to);
-        (&a[from], &mut b[0])
-    } else {
-        let (a, b) = slots.split_at_mut(from);
-        (&b[0], &mut a[to])
     }
 }

@@ -124,23 +124,18 @@ impl Innovation {
         }
     }
 
-    /// Innovation of `h` if its faulty sensors were those of `kinds`.
+    /// Innovation of `h`.
     pub fn predict(
         &mut self,
         layout: Layout,
         model: &ModeModel,
         reading: Reading<'_>,
         h: &Hypothesis,
-        kinds: Kinds,
         bias: bool,
     ) {
-        let p = layout.p;
+        let (p, kinds) = (layout.p, h.kinds());
         let (stride, fault) = (layout.stride(), layout.fault());
-        let width = padded(if bias || kinds.all() | h.accused() != 0 {
-            layout.size()
-        } else {
-            fault
-        });
+        let width = padded(h.active(layout, bias));
         for q in 0..p {
             let row = &mut self.rows[q * stride..q * stride + width];
             let output = model.output(q, &h.z, &h.z);

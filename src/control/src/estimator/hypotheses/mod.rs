@@ -12,6 +12,7 @@
 //! the policy decides. Where no hypothesis fits, the sensors are believed and `model_valid` is false.
 
 mod competition;
+mod effect;
 mod hypothesis;
 mod linear;
 mod model;
@@ -268,7 +269,7 @@ impl Bank {
         for slot in state.live.slots() {
             let h = &state.slots[slot];
             let seen = &mut state.seen[slot];
-            seen.predict(layout, model, reading, h, h.kinds(), bias);
+            seen.predict(layout, model, reading, h, bias);
         }
         let alone = state.live.count == 1;
         let head = state.live.first();

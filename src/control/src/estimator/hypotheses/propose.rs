@@ -21,6 +21,18 @@ struct Parent {
     unlikely: bool,
 }
 
+impl Parent {
+    /// That `action` happened to it.
+    const fn then(self, action: Action, score: f64, convinced: bool) -> Candidate {
+        Candidate {
+            score,
+            parent: self.slot,
+            action,
+            convinced,
+        }
+    }
+}
+
 impl Bank {
     /// All that may have happened to the hypothesis in `slot`.
     pub(super) fn propose(
@@ -43,12 +55,9 @@ impl Bank {
             unlikely: seen.square > QUIET.min(4.0 + p as f64),
         };
         state.outlook.stale = true;
-        state.candidates.add(Candidate {
-            score: parent.stay,
-            parent: slot,
-            action: Action::Stay,
-            convinced: parent.convinced,
-        });
+        state
+            .candidates
+            .add(parent.then(Action::Stay, parent.stay, parent.convinced));
         self.propose_changes(state, parent, model, reading);
         self.propose_faults(state, parent, model, reading);
         self.propose_ends(state, parent, model, reading);
@@ -67,12 +76,9 @@ impl Bank {
         let score = parent.score + price + self.trial(state, parent.slot, model, reading, action);
         let accuses = matches!(action, Action::Accuse(_) | Action::Scale(_));
         let at_once = !accuses || self.settings.trusts_model() || score > parent.stay;
-        state.candidates.add(Candidate {
-            score,
-            parent: parent.slot,
-            action,
-            convinced: convinced && at_once,
-        });
+        state
+            .candidates
+            .add(parent.then(action, score, convinced && at_once));
     }
 
     /// The plant: its loads, its matrices, where it started.
@@ -83,13 +89,11 @@ impl Bank {
         model: &ModeModel,
         reading: Reading<'_>,
     ) {
-        let Parent {
-            slot, convinced, ..
-        } = parent;
-        let mut consider = |action: Action, price: f64| {
-            self.consider(state, parent, model, reading, (action, price, convinced));
-        };
         let prices = self.prices;
+        let consider = |state: &mut BankState, action: Action, price: f64| {
+            let told = (action, price, parent.convinced);
+            self.consider(state, parent, model, reading, told);
+        };
         if parent.unlikely {
             for jump in 0..model.jumps.len() {
                 let together = match jump {
@@ -97,25 +101,25 @@ impl Bank {
                     _ if jump + 1 == model.jumps.len() => TOGETHER,
                     _ => 1.0,
                 };
-                consider(Action::Load(jump), together * prices.load);
+                consider(state, Action::Load(jump), together * prices.load);
             }
             if !parent.loose {
-                consider(Action::Loosen, prices.changed);
+                consider(state, Action::Loosen, prices.changed);
             }
         }
         if parent.loose {
-            consider(Action::Tighten, prices.release);
-        }
-        if state.first && parent.accused == 0 {
-            let start = (Action::Start, prices.fault, convinced);
-            self.consider(state, parent, model, reading, start);
+            let score = parent.stay + prices.release;
+            let tight = parent.then(Action::Tighten, score, parent.convinced);
+            state.candidates.add(tight);
         }
         if state.first {
+            if parent.accused == 0 {
+                consider(state, Action::Start, prices.fault);
+            }
             return;
         }
-        if parent.unlikely && state.own.displaced(&state.seen[slot].output, APART) != 0 {
-            let home = (Action::Home, prices.fault, convinced);
-            self.consider(state, parent, model, reading, home);
+        if parent.unlikely && state.own.displaced(&state.seen[parent.slot].output, APART) != 0 {
+            consider(state, Action::Home, prices.fault);
         }
         if parent.accused == 0 {
             self.propose_drift(state, parent, model, reading);
@@ -142,15 +146,12 @@ impl Bank {
         }
         let value = self.trial(state, parent.slot, model, reading, Action::Drift(set));
         if state.trial.square < QUIET + 2.0 * self.layout.p as f64 {
-            state.candidates.add(Candidate {
-                score: match trusted {
-                    true => parent.stay.max(parent.score + value) + 1.0,
-                    false => parent.stay,
-                },
-                parent: parent.slot,
-                action: Action::Drift(set),
-                convinced: trusted,
-            });
+            let score = match trusted {
+                true => parent.stay.max(parent.score + value) + 1.0,
+                false => parent.stay,
+            };
+            let drift = parent.then(Action::Drift(set), score, trusted);
+            state.candidates.add(drift);
         }
     }
 
@@ -162,6 +163,9 @@ impl Bank {
         model: &ModeModel,
         reading: Reading<'_>,
     ) {
+        if !parent.unlikely {
+            return;
+        }
         let p = self.layout.p;
         let free = sensors(p) & !parent.accused & reading.valid;
         let price = if state.first {
@@ -169,9 +173,6 @@ impl Bank {
         } else {
             self.prices.fault
         };
-        if !parent.unlikely {
-            return;
-        }
         let mut consider = |action: Action, price: f64| {
             let told = (action, price, parent.convinced);
             self.consider(state, parent, model, reading, told);

@@ -98,6 +98,11 @@ fn add_pairs(s: &mut [f64], p: usize, which: Sensors, term: impl Fn(usize, usize
     }
 }
 
+/// Whether what happened puts the state back to the model's own run.
+const fn starts_anew(action: Action) -> bool {
+    matches!(action, Action::Home | Action::Drift(_))
+}
+
 impl Bank {
     /// Log likelihood of the sample if `action` happened to the hypothesis in `slot`.
     pub(super) fn trial(
@@ -109,26 +114,23 @@ impl Bank {
         action: Action,
     ) -> f64 {
         let p = self.layout.p;
-        if state.outlook.stale {
+        if !starts_anew(action) && state.outlook.stale {
             let (h, rows) = (&state.slots[slot], &mut state.trial.rows);
             state.outlook.take(self.layout, model, h, rows);
         }
-        match action {
-            Action::Home => self.expect_own_run(state, reading, 0),
-            Action::Drift(set) => self.expect_own_run(state, reading, set),
-            _ => self.expect(state, slot, reading, action),
-        }
+        self.expect(state, slot, reading, action);
         self.open(state, slot, model, reading, action);
         state.trial.whiten(p);
         state.trial.likelihood(p)
     }
 
-    /// Innovation and covariance of the readings from the outlook of the hypothesis.
+    /// Innovation and covariance of the readings: from the model's own run where the hypothesis starts anew
+    /// from it, else from its outlook.
     fn expect(&self, state: &mut BankState, slot: usize, reading: Reading<'_>, action: Action) {
         let p = self.layout.p;
         let kinds = self.sets(&state.slots[slot], action);
         let bias = self.output_error();
-        let (outlook, mean) = (&state.outlook, &state.mean);
+        let (outlook, own, mean) = (&state.outlook, &state.own, &state.mean);
         let Innovation { r, s, weights, .. } = &mut state.trial;
         for q in 0..p {
             s[q * p..=q * p + q].fill(0.0);
@@ -139,6 +141,7 @@ impl Bank {
             }
             let expected;
             (weights[q], expected) = match action {
+                _ if starts_anew(action) => ([1.0, 0.0], own.y[q]),
                 Action::Freeze(frozen) if frozen == q => ([0.0; 2], mean[q]),
                 // The gain opens around its mean; nothing of the old entry counts.
                 Action::Scale(scaled) if scaled == q => {
@@ -149,34 +152,12 @@ impl Bank {
             };
             r[q] = reading.y[q] - expected;
             for j in (0..=q).filter(|&j| has(reading.valid, j)) {
-                s[q * p + j] = outlook.covariance((q, weights[q]), (j, weights[j]));
+                s[q * p + j] = match starts_anew(action) {
+                    true => own.covariance(q, j),
+                    false => outlook.covariance((q, weights[q]), (j, weights[j])),
+                };
             }
             s[q * p + q] += reading.noise[q] * reading.noise[q];
-        }
-    }
-
-    /// The same from the model's own run, if the sensors in `set` have a fault.
-    fn expect_own_run(&self, state: &mut BankState, reading: Reading<'_>, set: Sensors) {
-        let p = self.layout.p;
-        let own = &state.own;
-        let Innovation { r, s, .. } = &mut state.trial;
-        for q in 0..p {
-            s[q * p..=q * p + q].fill(0.0);
-            if !has(reading.valid, q) {
-                r[q] = 0.0;
-                s[q * p + q] = 1.0;
-                continue;
-            }
-            r[q] = reading.y[q] - own.y[q];
-            for j in (0..=q).filter(|&j| has(reading.valid, j)) {
-                s[q * p + j] = own.covariance(q, j);
-            }
-            let size = if has(set, q) {
-                self.settings.fault_size[q]
-            } else {
-                0.0
-            };
-            s[q * p + q] += reading.noise[q] * reading.noise[q] + size * size;
         }
     }
 
@@ -205,7 +186,7 @@ impl Bank {
                     jump.seen[q * p + j] + gains.sum::<f64>()
                 });
             }
-            Action::Accuse(set) | Action::Change(set) => {
+            Action::Accuse(set) | Action::Change(set) | Action::Drift(set) => {
                 for q in (0..p).filter(|&q| has(set & reading.valid, q)) {
                     s[q * p + q] += settings.fault_size[q] * settings.fault_size[q];
                 }
@@ -231,11 +212,7 @@ impl Bank {
                     });
                 }
             }
-            Action::Stay
-            | Action::Tighten
-            | Action::Release(_)
-            | Action::Home
-            | Action::Drift(_) => {}
+            Action::Stay | Action::Tighten | Action::Release(_) | Action::Home => {}
         }
     }
 }

@@ -1,0 +1,122 @@
+//! What happened, done to the hypothesis to which it did.
+
+use super::competition::{Action, Candidate, SCALE_MEAN, SCALE_VARIANCE};
+use super::hypothesis::{Hypothesis, Reading, has};
+use super::model::ModeModel;
+use super::{Bank, BankState};
+
+/// Variance of loads and input gains that are said to be gone, relative to that of their jumps.
+const REMAINS: f64 = 0.01;
+
+impl Bank {
+    /// The hypothesis in `slot` becomes what the candidate makes of its parent.
+    pub(super) fn take_effect(
+        &self,
+        state: &mut BankState,
+        candidate: Candidate,
+        slot: usize,
+        model: &ModeModel,
+        reading: Reading<'_>,
+    ) {
+        let (layout, settings) = (self.layout, &self.settings);
+        let (p, fault, stride) = (layout.p, layout.fault(), layout.stride());
+        let (parent, child) = pair(&mut state.slots, candidate.parent, slot);
+        child.take(parent);
+        let kinds = self.sets(child, candidate.action);
+        (child.additive, child.stuck, child.scaled) = (kinds.additive, kinds.stuck, kinds.scaled);
+        match candidate.action {
+            Action::Load(jump) => {
+                let jump = &model.jumps[jump];
+                child.jump(layout, model, jump, &state.u, settings.gain_error);
+            }
+            Action::Accuse(set) | Action::Change(set) => {
+                for q in (0..p).filter(|&q| has(set, q)) {
+                    let k = fault + q;
+                    let additive = self.output_error() || has(parent.additive, q);
+                    if has(parent.stuck | parent.scaled, q) || !additive {
+                        child.open(k, 0.0, self.fault_variance(q));
+                    } else {
+                        child.cov[k * stride + k] += self.fault_variance(q);
+                    }
+                }
+            }
+            Action::Release(set) => {
+                for q in (0..p).filter(|&q| has(set, q)) {
+                    child.open(fault + q, 0.0, self.healthy_variance(model, q));
+                }
+            }
+            Action::Freeze(q) => {
+                let variance = reading.noise[q] * reading.noise[q] / state.count[q].max(1.0);
+                child.open(fault + q, state.mean[q], variance);
+            }
+            Action::Scale(q) => child.open(fault + q, SCALE_MEAN, SCALE_VARIANCE),
+            Action::Start => {
+                for (k, sd) in settings.start_elsewhere.iter().enumerate() {
+                    child.cov[k * stride + k] += sd * sd;
+                }
+            }
+            Action::Home | Action::Drift(_) => {
+                for (k, &x) in state.own.x.iter().enumerate() {
+                    child.open(k, x, state.own.variance(model, settings, k));
+                    child.before[k] = x;
+                }
+                self.forget_loads(child, model);
+                for q in 0..p {
+                    let variance = match has(child.additive, q) {
+                        true => self.fault_variance(q),
+                        false => self.healthy_variance(model, q),
+                    };
+                    child.open(fault + q, 0.0, variance);
+                }
+            }
+            Action::Loosen => {
+                child.loose = true;
+                let load = layout.load() + layout.state_load();
+                for (i, v) in self.looseness(model, parent, &state.u).enumerate() {
+                    for (row, column) in
+                        [(i, i), (i, load + i), (load + i, i), (load + i, load + i)]
+                    {
+                        child.cov[row * stride + column] += v;
+                    }
+                }
+            }
+            Action::Tighten => child.loose = false,
+            Action::Stay => {}
+        }
+    }
+
+    /// Loads and errors of the input gains are gone.
+    fn forget_loads(&self, h: &mut Hypothesis, model: &ModeModel) {
+        for (k, size) in model.load_size.iter().enumerate() {
+            h.open(self.layout.load() + k, 0.0, REMAINS * size * size);
+        }
+        let gain = self.settings.gain_error;
+        for k in self.layout.gain()..self.layout.fault() {
+            h.open(k, 0.0, REMAINS * gain * gain);
+        }
+    }
+
+    /// Variance of the fault of sensor `q` when it begins.
+    fn fault_variance(&self, q: usize) -> f64 {
+        self.settings.fault_size[q] * self.settings.fault_size[q]
+    }
+
+    /// Variance of the fault entry of a healthy sensor.
+    fn healthy_variance(&self, model: &ModeModel, q: usize) -> f64 {
+        match self.output_error() {
+            true => model.most[self.layout.fault() + q],
+            false => 0.0,
+        }
+    }
+}
+
+/// Two different slots at once.
+fn pair(slots: &mut [Hypothesis], from: usize, to: usize) -> (&Hypothesis, &mut Hypothesis) {
+    if from < to {
+        let (a, b) = slots.split_at_mut(to);
+        (&a[from], &mut b[0])
+    } else {
+        let (a, b) = slots.split_at_mut(from);
+        (&b[0], &mut a[to])
+    }
+}
