@@ -244,7 +244,7 @@ fn check_estimator(design: &Design) -> Result<(), CoverageError> {
 }
 
 /// The sizes and rates of the state-based estimator follow from the plant, the signals, and what
-/// the user may choose: model error, fault rate and length, authority, loads, policy, disturbance.
+/// the user may choose: model error, fault rate and length, authority, loads, policy, mode length, disturbance.
 fn hypotheses_fit(design: &Design) -> bool {
     let estimator = &design.controller.estimator;
     let Some(found) = &estimator.hypotheses else {
@@ -256,6 +256,7 @@ fn hypotheses_fit(design: &Design) -> bool {
         fault_rate: found.fault_rate,
         fault_length: 1.0 / found.release_rate,
         ambiguous: found.ambiguous,
+        mode_length: found.mode_rate.map(f64::recip),
         authority: Some(found.authority.clone()),
         input_load: Some(found.input_load.clone()),
     };
@@ -272,9 +273,13 @@ fn hypotheses_fit(design: &Design) -> bool {
     let same_turns = turns.clone().all(|(a, b)| (a - b).abs() <= 1e-12 * a.abs());
     derived.angles.clone_from(&found.angles);
     derived.release_rate = found.release_rate;
+    derived.mode_rate = found.mode_rate;
     let chosen = (0.0..=1.0).contains(&found.model_error)
         && (1e-12..=0.1).contains(&found.fault_rate)
-        && (1e-9..=0.5).contains(&found.release_rate);
+        && (1e-9..=0.5).contains(&found.release_rate)
+        && found
+            .mode_rate
+            .is_none_or(|rate| (1e-9..=0.5).contains(&rate));
     same_turns && chosen && derived == *found
 }
 

@@ -69,7 +69,7 @@ pub use blocks::{BlockKind, BlockName};
 pub use certificate::{CertificateError, ControlCertificate};
 pub use controllability::{Uncontrollable, check_controllable};
 #[cfg(feature = "solver")]
-pub use hypotheses::HypothesesSpec;
+pub use hypotheses::{HypothesesSpec, MODE_LENGTH};
 pub use lyapunov::{DwellTime, Lyapunov};
 pub use matrices::{dense, mode_models, plain};
 pub use observer::{LostCertificate, ObserverCertificate, ObserverDesign};

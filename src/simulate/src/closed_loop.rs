@@ -11,9 +11,9 @@ use serde::Serialize;
 pub enum Variant {
     /// The design as it is: faults estimated and compensated.
     Ftc,
-    /// The same gains, believing every sensor.
+    /// The same gains, believing every sensor, told the mode.
     NoFtc,
-    /// The same gains, told the true fault: what a perfect estimate of it would give. One that also
+    /// The same gains, told the true fault and the mode: what a perfect estimate of it would give. One that also
     /// takes up disturbance or noise may do better.
     ToldTheFault,
     /// The additive FTC of the paper's section III: gains of Theorem 1, no attenuation.
@@ -140,6 +140,10 @@ impl Regulator for Tolerant<'_> {
             .sample(seen.tick, seen.told, &seen.y, &seen.reference)
             .and_then(|sample| sample.compensating(compensate))
             .expect("plant and controller have the same sizes");
+        let sample = match self.variant {
+            Variant::NoFtc | Variant::ToldTheFault => sample.telling_the_mode(),
+            _ => sample,
+        };
         self.controller.tick(&mut self.state, &sample);
     }
 
