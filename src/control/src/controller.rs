@@ -264,8 +264,13 @@ impl Controller {
 
     /// Whether the mode is found from the readings, not told.
     pub fn finds_the_mode(&self) -> bool {
-        let settings = self.parameters.estimator.hypotheses.as_ref();
-        self.bank.is_some() && settings.is_some_and(|settings| settings.mode_rate.is_some())
+        self.parameters.estimator.finds_the_mode()
+    }
+
+    /// The mode (0-based) found from the readings, if that is what the controller does.
+    pub fn found_mode(&self, state: &ControllerState) -> Option<usize> {
+        let found = state.bank.as_ref().map(|bank| bank.mode().0);
+        found.filter(|_| self.finds_the_mode())
     }
 
     /// One tick: takes the sample and leaves the command in `state.command`.

@@ -212,6 +212,12 @@ pub struct Estimator {
 }
 
 impl Estimator {
+    /// Whether the mode is found from the readings.
+    pub fn finds_the_mode(&self) -> bool {
+        let settings = self.hypotheses.as_ref().map(|found| found.mode_rate);
+        self.method == EstimatorMethod::Observer && settings.flatten().is_some()
+    }
+
     /// The largest fault estimate of each sensor (p), output units.
     pub fn authority(&self) -> &[f64] {
         let hypotheses = self.hypotheses.as_ref();

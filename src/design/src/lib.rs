@@ -25,6 +25,7 @@
 // Without the solver, what only a synthesis needs is never called.
 #![cfg_attr(not(feature = "solver"), allow(dead_code))]
 
+pub mod apart;
 #[cfg(feature = "solver")]
 pub mod as_printed;
 #[cfg(feature = "solver")]

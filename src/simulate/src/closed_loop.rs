@@ -62,6 +62,8 @@ pub struct Report<'a> {
     pub residual: &'a [f64],
     /// Declared faults (p).
     pub flagged: &'a [bool],
+    /// The mode (0-based) found from the readings, where it is not told.
+    pub mode: Option<usize>,
 }
 
 /// Every signal of one sample.
@@ -96,6 +98,8 @@ pub struct Record {
     pub residual: Vec<f64>,
     /// Declared faults (p).
     pub flagged: Vec<bool>,
+    /// The mode (0-based) found from the readings, where it is not told.
+    pub mode_hat: Option<usize>,
 }
 
 /// One run.
@@ -158,6 +162,10 @@ impl Regulator for Tolerant<'_> {
             fault: &estimator.fault,
             residual: &estimator.residual,
             flagged: &estimator.flagged,
+            mode: match self.variant {
+                Variant::NoFtc | Variant::ToldTheFault => None,
+                _ => self.controller.found_mode(&self.state),
+            },
         }
     }
 }
@@ -284,10 +292,40 @@ fn record(plant: &PlantState, regulator: &dyn Regulator) -> Record {
         f_hat: report.fault.to_vec(),
         residual: report.residual.to_vec(),
         flagged: report.flagged.to_vec(),
+        mode_hat: report.mode,
     }
 }
 
+/// Samples in which another mode was found from the readings than the plant was in.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[non_exhaustive]
+pub struct WrongModes {
+    /// How many.
+    pub samples: u64,
+    /// Most in a row.
+    pub longest: u64,
+}
+
 impl Trajectory {
+    /// Whether the mode was found from the readings.
+    pub fn finds_the_mode(&self) -> bool {
+        let first = self.records.first();
+        first.is_some_and(|record| record.mode_hat.is_some())
+    }
+
+    /// How often another mode was found than the plant was in; none where the mode was told.
+    pub fn wrong_modes(&self) -> Option<WrongModes> {
+        let mut found = WrongModes::default();
+        let mut row = 0;
+        for record in &self.records {
+            let wrong = record.mode_hat.is_some_and(|mode| mode != record.mode);
+            row = if wrong { row + 1 } else { 0 };
+            found.samples += u64::from(wrong);
+            found.longest = found.longest.max(row);
+        }
+        self.finds_the_mode().then_some(found)
+    }
+
     /// Figures of merit of each tracked output (rows of `tracked`, 0-based), as far as the plant could
     /// be integrated.
     pub fn merits(&self, tracked: &[usize]) -> Vec<Merits> {

@@ -81,6 +81,11 @@ impl Run {
         let flags = run.records.iter().flat_map(|record| &record.flagged);
         let flags = doubles(py, flags.map(|&flag| f64::from(u8::from(flag))));
         signals.push((format!("{key}.fault"), width, flags));
+        if run.finds_the_mode() {
+            let modes = run.records.iter().filter_map(|record| record.mode_hat);
+            let modes = doubles(py, modes.map(|mode| (mode + 1) as f64));
+            signals.push((format!("{key}.mode_hat"), 0, modes));
+        }
         signals
     }
 }

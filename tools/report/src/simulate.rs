@@ -151,6 +151,7 @@ impl Simulation {
                 }
                 let flags = record.flagged.iter();
                 row.extend(flags.map(|&flag| u8::from(flag).to_string()));
+                row.extend(record.mode_hat.map(|mode| (mode + 1).to_string()));
             }
             table.row(&row)?;
         }
@@ -218,12 +219,16 @@ fn header(record: &Record, trajectories: &[Trajectory]) -> Vec<String> {
             names.extend(vector(&prefix, name, values.len()));
         }
         names.extend(vector(&prefix, "fault", record.flagged.len()));
+        if trajectory.finds_the_mode() {
+            names.push(format!("{prefix}mode_hat"));
+        }
     }
     names
 }
 
 /// Per variant `mse` and `vaf`, each measured and true, one number per tracked output; of the
-/// deadbeat bound the true `mse` alone. Beside them the `warnings`, one sentence each.
+/// deadbeat bound the true `mse` alone. Where the mode is found from the readings, in how many samples
+/// another was found than the plant was in, and at most how many in a row. Beside them the `warnings`, one sentence each.
 fn metrics(
     design: &Design,
     trajectories: &[Trajectory],
@@ -234,10 +239,13 @@ fn metrics(
     let of = |trajectory: &Trajectory| {
         let merits = trajectory.merits(tracked);
         let list = |pick: fn(&Merits) -> f64| merits.iter().map(pick).collect::<Vec<f64>>();
-        let value = json!({
+        let mut value = json!({
             "mse": { "measured": list(|m| m.measured.mse), "true": list(|m| m.truth.mse) },
             "vaf": { "measured": list(|m| m.measured.vaf), "true": list(|m| m.truth.vaf) },
         });
+        if let Some(wrong) = trajectory.wrong_modes() {
+            value["wrong_mode"] = json!({ "samples": wrong.samples, "longest": wrong.longest });
+        }
         (trajectory.variant.key().to_string(), value)
     };
     let mut variants: Map<String, Value> = trajectories.iter().map(of).collect();
@@ -291,6 +299,13 @@ fn summary(design: &Design, trajectories: &[Trajectory], bound: Option<&[f64]>) 
     for (mse, &output) in bound.unwrap_or_default().iter().zip(tracked) {
         let name = &design.signals.outputs[output].name;
         let _ = writeln!(text, "{BOUND:<16}{name:<12}{:>14}{mse:>14.5e}", "");
+    }
+    for wrong in trajectories.iter().filter_map(Trajectory::wrong_modes) {
+        let _ = writeln!(
+            text,
+            "\nmode found from the readings: another than the plant's in {} samples, at most {} in a row",
+            wrong.samples, wrong.longest
+        );
     }
     if constant {
         text.push_str(
