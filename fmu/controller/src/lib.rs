@@ -66,7 +66,8 @@ impl Spans {
             model_valid: table.span(Role::ModelValid),
             load_estimate: table.span(Role::LoadEstimate),
             actuator_fault: table.span(Role::ActuatorFault),
-            mode_estimate: [Role::ModeEstimate, Role::ModeEstimateReal].map(|role| table.span(role)),
+            mode_estimate: [Role::ModeEstimate, Role::ModeEstimateReal]
+                .map(|role| table.span(role)),
             mode_probability: table.span(Role::ModeProbability),
         }
     }

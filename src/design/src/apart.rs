@@ -65,12 +65,7 @@ fn deviations(one: &Mode, other: &Mode, settings: &Hypotheses, inputs: &[f64]) -
 }
 
 /// The same from the state `x` (n) under the constant input `u` (m), relative to the `noise` (p).
-fn parting(
-    one: &Mode,
-    other: &Mode,
-    (x, u): (DVector<f64>, &DVector<f64>),
-    noise: &[f64],
-) -> f64 {
+fn parting(one: &Mode, other: &Mode, (x, u): (DVector<f64>, &DVector<f64>), noise: &[f64]) -> f64 {
     let (mut a, mut b) = (x.clone(), x);
     let mut most = 0.0_f64;
     for _ in 0..SAMPLES {

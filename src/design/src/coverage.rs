@@ -26,8 +26,9 @@ const FARTHEST: f64 = 1e6;
 const LARGEST_THRESHOLD: f64 = 1e3;
 
 /// Numbers of a design that `verify` holds against bounds only, in words for its report.
-pub const UNCOVERED: [&str; 6] = [
+pub const UNCOVERED: [&str; 7] = [
     "what the user tells the state-based estimator: model error, fault rate and length, largest correction, loads, the disturbance's size and period",
+    "that the mode, told or found from the readings, is the plant's (the claims hold while it is)",
     "the values of the operating points (any are admissible: the claims are about deviations from them)",
     "the ranges of the inputs (the claims hold while no input is at a limit)",
     "the coefficients of the fault estimator's predictors and its thresholds, debounce and learning (the claims hold \

@@ -104,9 +104,7 @@ impl Controller {
 
     /// Counted from 1.
     fn mode_hat(&self) -> Option<usize> {
-        self.controller
-            .found_mode(&self.state)
-            .map(|mode| mode + 1)
+        self.controller.found_mode(&self.state).map(|mode| mode + 1)
     }
 
     fn mode_probability(&self) -> Vec<f64> {

@@ -289,6 +289,7 @@ impl Bank {
     /// Whom to believe: an accusation must beat the best explanation without one by its odds.
     fn believe(&self, state: &mut BankState, reading: Reading<'_>) {
         let (p, fault) = (self.layout.p, self.layout.fault());
+        let mode = self.decide_mode(state);
         let mut best = state.live.first();
         let mut top = f64::NEG_INFINITY;
         for slot in state.live.slots() {
@@ -301,7 +302,7 @@ impl Bank {
             let fits = h.accused() == 0
                 || h.misfit < 3.0 * p as f64 + 6.0
                     && state.seen[slot].square < 20.0 + 4.0 * p as f64;
-            if h.convinced && fits && value > top {
+            if h.convinced && fits && h.mode as usize == mode && value > top {
                 top = value;
                 best = slot;
             }

@@ -303,7 +303,7 @@ impl Bank {
             self.compete(state, reading);
         }
         state.first = false;
-        self.find_mode(state);
+        state.mode = state.slots[state.best].mode as usize;
         self.correct_own_run(state, reading);
         self.learn_noise(state, reading);
         self.conclude(state, reading);

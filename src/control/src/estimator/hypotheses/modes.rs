@@ -105,6 +105,9 @@ impl Bank {
         state.slots[head].score = 0.0;
         state.best = head;
         state.suspect = 0;
+        if self.others() > 0 {
+            self.weigh_modes(state);
+        }
     }
 
     /// A hypothesis for every other mode: that the plant has entered it with this sample, or enters it now.
@@ -143,18 +146,31 @@ impl Bank {
         }
     }
 
-    /// The mode of the leading hypothesis, and the probability of each.
-    pub(super) fn find_mode(&self, state: &mut BankState) {
-        state.mode = state.slots[state.best].mode as usize;
+    /// The mode (0-based) to believe in: another than before must have the odds of an accusation, all its
+    /// hypotheses together.
+    pub(super) fn decide_mode(&self, state: &mut BankState) -> usize {
         if self.others() == 0 {
-            return;
+            return state.slots[state.live.first()].mode as usize;
         }
-        state.probability.fill(0.0);
+        self.weigh_modes(state);
+        let shares = state.probability.iter().enumerate();
+        let (likeliest, &most) = shares
+            .max_by(|a, b| a.1.total_cmp(b.1))
+            .unwrap_or((0, &0.0));
+        match most > libm::exp(self.settings.odds) * state.probability[state.mode] {
+            true => likeliest,
+            false => state.mode,
+        }
+    }
+
+    /// The probability of each mode.
+    pub(super) fn weigh_modes(&self, state: &mut BankState) {
         let convinced = |slot: &usize| state.slots[*slot].convinced;
         let scores = state.live.slots().filter(convinced);
         let most = scores
             .map(|slot| state.slots[slot].score)
             .fold(f64::NEG_INFINITY, f64::max);
+        state.probability.fill(0.0);
         let mut sum = 0.0;
         for slot in state.live.slots() {
             let h = &state.slots[slot];
