@@ -95,9 +95,9 @@ const STANDS: f64 = 1000.0;
 
 #[test]
 fn modes_of_random_plants_are_found() {
-    for faulty in [false, true] {
+    for (seed, count, faulty) in [(41, 24, false), (41, 24, true), (4242, 40, false)] {
         let mut ratios = Vec::new();
-        for mut design in designs(41, 24) {
+        for mut design in designs(seed, count) {
             if faulty {
                 let te = design.plant.sample_time;
                 design.scenario.fault[0] = Waveform::Steps {
@@ -124,10 +124,10 @@ fn modes_of_random_plants_are_found() {
             println!("{:.4} {modes:?} of {switches}", ratios.last().unwrap());
             assert!(modes.samples <= 2 * switches, "{modes:?} of {switches}");
         }
-        let count = ratios.len();
+        let kept = ratios.len();
         let [median, most, worst] = [0.5, 0.9, 1.0].map(|share| quantile(&mut ratios, share));
-        println!("faulty {faulty}, {count} plants: {median:.4} {most:.4} {worst:.4}");
-        assert!(count >= 20 && median <= 1.0 && worst <= 1.2);
+        println!("faulty {faulty}, {kept} of {count}: {median:.4} {most:.4} {worst:.4}");
+        assert!(kept >= 20 && median <= 1.0 && worst <= 3.0);
         assert!(faulty || most <= 1.05);
     }
 }
