@@ -119,7 +119,9 @@ impl Bank {
             return;
         }
         if parent.unlikely && state.own.displaced(&state.seen[parent.slot].output, APART) != 0 {
-            consider(state, Action::Home, prices.fault);
+            // What stands against the loads that would then be gone makes up for the price of a fault.
+            let against = implausible(model, &state.slots[parent.slot].z[self.layout.load()..]);
+            consider(state, Action::Home, (prices.fault + against).min(0.0));
         }
         if parent.accused == 0 {
             self.propose_drift(state, parent, model, reading);
@@ -230,6 +232,15 @@ impl Bank {
             self.consider(state, parent, model, reading, release);
         }
     }
+}
+
+/// What a priori stands against loads of these sizes, in log likelihood.
+fn implausible(model: &ModeModel, loads: &[f64]) -> f64 {
+    let sizes = model.load_size.iter().zip(loads);
+    let squares = sizes
+        .filter(|(size, _)| **size > 0.0)
+        .map(|(size, load)| (load / size) * (load / size));
+    0.5 * squares.sum::<f64>()
 }
 
 /// All of `p` sensors.
