@@ -38,7 +38,7 @@ impl Variant {
     }
 }
 
-/// Whatever closes the loop: sees the plant's outputs, gives a command.
+/// What closes the loop: from the plant's outputs to a command.
 pub trait Regulator {
     /// One tick.
     fn tick(&mut self, seen: &PlantState);
@@ -239,12 +239,7 @@ fn drive(
     let mut acting = regulator.command().to_vec();
     let silent_fault = vec![0.0; state.y.len()];
     let silent_disturbance = vec![0.0; state.disturbance.len()];
-    let external = External {
-        fault: &silent_fault,
-        disturbance: &silent_disturbance,
-        mode: None,
-        noise: true,
-    };
+    let external = External::new(&silent_fault, &silent_disturbance);
     let mut stalled = None;
     for _ in 0..plant.scenario().steps {
         plant.observe(&mut state, &external);

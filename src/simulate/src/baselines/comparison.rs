@@ -63,17 +63,15 @@ fn predictive(design: &Design, played: &Trajectory) -> Result<PredictiveSpec, Ba
         let sum: f64 = records.iter().map(|r| r.disturbance[channel].powi(2)).sum();
         (sum / records.len().max(1) as f64).sqrt()
     };
-    Ok(PredictiveSpec {
-        tracked: design.controller.feedback.tracked.clone(),
-        output_weight: asked.output_weight.clone(),
-        input_weight: asked.input_weight.clone(),
-        limits: design.signals.input_limits(),
-        noise: noise
-            .map(|(output, noise)| noise.max(LEAST_NOISE * output.nominal))
-            .collect(),
-        disturbance: (0..channels).map(power).collect(),
-        horizon: HORIZON,
-    })
+    let noise = noise.map(|(output, noise)| noise.max(LEAST_NOISE * output.nominal));
+    let tracked = design.controller.feedback.tracked.clone();
+    let mut spec = PredictiveSpec::new(&design.plant, tracked, noise.collect());
+    spec.output_weight.clone_from(&asked.output_weight);
+    spec.input_weight.clone_from(&asked.input_weight);
+    spec.limits = design.signals.input_limits();
+    spec.disturbance = (0..channels).map(power).collect();
+    spec.horizon = HORIZON;
+    Ok(spec)
 }
 
 /// Per tracked output, the deadbeat bound of the scenario's reference: the output follows as many samples late as the plant and the latency need.
