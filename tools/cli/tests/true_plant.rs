@@ -349,7 +349,7 @@ fn a_model_error_of_a_nonlinear_plant_is_refused() {
     assert_eq!(run.code(), 2, "{}", run.stdout());
     assert!(
         run.stderr()
-            .contains("--model-error: model error is 0.1, but it changes matrices")
+            .contains("--model-error: model_error is 0.1, but it changes matrices")
     );
     assert!(!bench.path("out").exists());
     let run = campaign(&[]);

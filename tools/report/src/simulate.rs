@@ -237,9 +237,17 @@ impl<W: Write> TableOfSamples<W> {
     /// What the sink says.
     pub fn finish(self) -> io::Result<()> {
         match self.table {
-            Some(table) => table.finish().map(drop).map_err(io::Error::from),
+            Some(table) => table.finish().map(drop).map_err(unwritten),
             None => Ok(()),
         }
+    }
+}
+
+/// What the sink said, of its kind.
+fn unwritten(error: csv::Error) -> io::Error {
+    match error.into_kind() {
+        csv::ErrorKind::Io(error) => error,
+        kind => io::Error::other(format!("{kind:?}")),
     }
 }
 
@@ -249,7 +257,8 @@ impl<W: Write> Samples for TableOfSamples<W> {
             return Ok(());
         };
         if let Some(sink) = self.sink.take() {
-            self.table = Some(Table::into_sink(sink, header(first, runs))?);
+            let table = Table::into_sink(sink, header(first, runs)).map_err(unwritten)?;
+            self.table = Some(table);
         }
         let row = &mut self.row;
         row.clear();
@@ -266,7 +275,7 @@ impl<W: Write> Samples for TableOfSamples<W> {
             row.extend(flags.map(|&flag| u8::from(flag).to_string()));
         }
         match &mut self.table {
-            Some(table) => Ok(table.row(&*row)?),
+            Some(table) => table.row(&*row).map_err(unwritten),
             None => Ok(()),
         }
     }
