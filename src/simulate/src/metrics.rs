@@ -98,7 +98,10 @@ mod tests {
         let signal: Vec<f64> = (0..1000).map(|k| 1e8 + f64::from(k % 2)).collect();
         let reference = vec![1e8 + 0.5; 1000];
         let found = merit(&signal, &reference);
-        assert!((found.mse - 0.25).abs() < 1e-12 && found.vaf == 0.0, "{found:?}");
+        assert!(
+            (found.mse - 0.25).abs() < 1e-12 && found.vaf == 0.0,
+            "{found:?}"
+        );
         let sound = variance(&signal);
         let mut sum = MeritSum::default();
         signal.iter().for_each(|&y| sum.add(y, 0.0));

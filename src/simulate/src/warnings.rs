@@ -1,7 +1,7 @@
 //! What a user should know of a run that went through: values; the program that shows them adds the words.
 
-use crate::closed_loop::Record;
 use crate::Variant;
+use crate::closed_loop::Record;
 use ftc_control::estimator::InputHistory;
 use ftc_control::parameters::{Estimator, EstimatorMethod};
 use ftc_design::Design;
@@ -148,7 +148,11 @@ impl<'a> RunWatch<'a> {
 
 /// All warnings of the runs of a design; each with the first tick it could not be integrated through.
 pub fn of_runs(design: &Design, runs: &[(RunWatch<'_>, Option<u64>)]) -> Vec<RunWarning> {
-    let ftc = || runs.iter().map(|(run, _)| run).filter(|run| run.variant == Variant::Ftc);
+    let ftc = || {
+        runs.iter()
+            .map(|(run, _)| run)
+            .filter(|run| run.variant == Variant::Ftc)
+    };
     let stopped = runs.iter().filter_map(|(run, stalled)| {
         Some(RunWarning::Stopped {
             variant: run.variant,

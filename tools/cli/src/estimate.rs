@@ -1,8 +1,8 @@
 //! What a command will take, said before it begins.
 
+use crate::How;
 use crate::failure::Failure;
 use crate::progress::Progress;
-use crate::How;
 use ftc_design::assembly::Request;
 use ftc_design::work::Work;
 use report::simulate::Extent;

@@ -59,7 +59,11 @@ const EXAMPLES: [Example; 11] = [
     example!(
         "quadruple_tank",
         "Python: four tanks, from their physics to FMUs",
-        ["python/quadruple_tank.py", "python/study.py", "python/loop.py"]
+        [
+            "python/quadruple_tank.py",
+            "python/study.py",
+            "python/loop.py"
+        ]
     ),
     example!(
         "dc_motor",
@@ -69,12 +73,21 @@ const EXAMPLES: [Example; 11] = [
     example!(
         "boost_converter",
         "Python: a boost converter, from its physics to FMUs",
-        ["python/boost_converter.py", "python/study.py", "python/loop.py"]
+        [
+            "python/boost_converter.py",
+            "python/study.py",
+            "python/loop.py"
+        ]
     ),
     example!(
         "from_a_log",
         "Python: from logs of a plant to FMUs, without a model",
-        ["python/from_a_log.py", "logged.toml", "logged_open.csv", "logged_closed.csv"]
+        [
+            "python/from_a_log.py",
+            "logged.toml",
+            "logged_open.csv",
+            "logged_closed.csv"
+        ]
     ),
 ];
 
@@ -102,7 +115,12 @@ pub fn files(name: &str) -> Result<Vec<(String, Vec<u8>)>, Failure> {
         .map(|example| {
             let files = example.files.iter();
             files
-                .map(|(path, bytes)| (path.trim_start_matches("python/").to_owned(), bytes.to_vec()))
+                .map(|(path, bytes)| {
+                    (
+                        path.trim_start_matches("python/").to_owned(),
+                        bytes.to_vec(),
+                    )
+                })
                 .collect()
         })
         .ok_or_else(|| {

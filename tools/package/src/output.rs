@@ -385,6 +385,21 @@ mod tests {
     }
 
     #[test]
+    fn a_full_disk_is_not_blamed_on_the_directory() {
+        let said = |kind| unwritten(&io::Error::from(kind), "directory");
+        let full = said(io::ErrorKind::StorageFull);
+        assert!(full.contains("the disk is full") && full.contains("make room"));
+        assert!(!full.contains("may write"), "{full}");
+        assert!(said(io::ErrorKind::QuotaExceeded).contains("your share of the disk"));
+        assert!(said(io::ErrorKind::PermissionDenied).contains("a directory you may write to"));
+        // A writer that fails halfway passes its error on, of its kind.
+        let root = TempDir::new().unwrap();
+        let staging = Staging::new(root.path()).unwrap();
+        let written = staging.add_written("a", |_| Err(io::ErrorKind::StorageFull.into()));
+        assert!(written.unwrap_err().what.contains("the disk is full"));
+    }
+
+    #[test]
     fn a_directory_that_a_run_works_in_is_left_alone() {
         let root = TempDir::new().unwrap();
         let first = Staging::new(root.path()).unwrap();

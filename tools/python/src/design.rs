@@ -76,7 +76,12 @@ fn pool(py: Python<'_>, threads: usize) -> PyResult<rayon::ThreadPool> {
             return Err(errors::of_sentence(py, what));
         }
     };
-    built.map_err(|error| errors::of_sentence(py, format!("threads: none can be started ({error}): give fewer")))
+    built.map_err(|error| {
+        errors::of_sentence(
+            py,
+            format!("threads: none can be started ({error}): give fewer"),
+        )
+    })
 }
 
 /// A design from its record.

@@ -102,7 +102,10 @@ fn outline(stretch: &[Point]) -> impl Iterator<Item = Point> {
     let by_value = |a: &usize, b: &usize| stretch[*a][1].total_cmp(&stretch[*b][1]);
     let finite = || (0..stretch.len()).filter(|&at| is_finite(&stretch[at]));
     let ends = (!stretch.is_empty()).then(|| [0, stretch.len() - 1]);
-    let inner = finite().min_by(by_value).into_iter().chain(finite().max_by(by_value));
+    let inner = finite()
+        .min_by(by_value)
+        .into_iter()
+        .chain(finite().max_by(by_value));
     let mut kept: Vec<usize> = ends.into_iter().flatten().chain(inner).collect();
     kept.sort_unstable();
     kept.dedup();

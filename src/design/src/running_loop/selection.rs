@@ -8,9 +8,7 @@ use super::gain::Channel;
 use super::{Models, RunningLoop, TOLERANCE, command_deviation};
 use crate::observer::{self, Candidate};
 use crate::verdict::DesignError;
-use crate::{
-    ObserverChoice, ObserverDesign, ObserverSpec, SolverFailure, StateFeedback, parallel,
-};
+use crate::{ObserverChoice, ObserverDesign, ObserverSpec, SolverFailure, StateFeedback, parallel};
 use ftc_control::parameters::{Observer, ObserverKind};
 use ftc_plant::SwitchedPlant;
 use ftc_plant::scaling::Scaling;

@@ -58,7 +58,10 @@ impl Digest {
             sample_time: design.plant.sample_time,
             samples: 0,
             merits: MeritSums::new(tracked),
-            faulty: (vec![Intervals::default(); dims.outputs], Intervals::default()),
+            faulty: (
+                vec![Intervals::default(); dims.outputs],
+                Intervals::default(),
+            ),
             alarms: AlarmWatch::new(dims.outputs),
             modes: Vec::new(),
             switches: Vec::new(),
@@ -100,19 +103,28 @@ impl Digest {
         }
         self.faulty.1.see(tick, any);
         self.alarms.see(record);
-        if self.switches.last().is_none_or(|last| last.1 != record.mode) {
+        if self
+            .switches
+            .last()
+            .is_none_or(|last| last.1 != record.mode)
+        {
             self.switches.push((record.tick, record.mode));
             if let Err(place) = self.modes.binary_search(&record.mode) {
                 self.modes.insert(place, record.mode);
             }
         }
         if self.reference.is_empty() {
-            self.reference = record.reference.iter().map(|&first| (first, false)).collect();
+            self.reference = record
+                .reference
+                .iter()
+                .map(|&first| (first, false))
+                .collect();
         }
         for ((first, moves), now) in self.reference.iter_mut().zip(&record.reference) {
             *moves |= now != first;
         }
-        self.curves.see(record, record.tick as f64 * self.sample_time);
+        self.curves
+            .see(record, record.tick as f64 * self.sample_time);
     }
 
     /// Samples seen.

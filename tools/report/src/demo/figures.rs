@@ -165,13 +165,10 @@ impl<'a> Scene<'a> {
             with_unit(&format!("residual of {name}"), unit_of(outputs, sensor)),
         )
         .with(
-            Series::new(
-                "residual",
-                points(&run.curves().residual, sensor),
-            )
-            .ink(Ink::Purple)
-            .weight(Weight::Thin)
-            .step(),
+            Series::new("residual", points(&run.curves().residual, sensor))
+                .ink(Ink::Purple)
+                .weight(Weight::Thin)
+                .step(),
         );
         if let Some(&threshold) = self.design.controller.estimator.thresholds.get(sensor) {
             let (from, until) = (0.0, self.time(run.samples() - 1));
