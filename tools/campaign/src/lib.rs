@@ -177,9 +177,12 @@ pub fn run_watched<E>(
     let mut first = range.start;
     while first < range.end && !watch.stop.load(Ordering::Relaxed) {
         let last = range.end.min(first + BATCH);
-        let outcomes: Vec<Option<Outcome>> = (first..last)
+        // One by one: a thread that took many at once would be waited for at the end of the batch.
+        let outcomes: Vec<Option<Outcome>> = (0..(last - first) as usize)
             .into_par_iter()
-            .map(|run| {
+            .with_max_len(1)
+            .map(|at| {
+                let run = first + at as u64;
                 if watch.stop.load(Ordering::Relaxed) {
                     return None;
                 }

@@ -13,9 +13,8 @@ const LONG: f64 = 10.0;
 /// Bytes of memory or of a file that are worth a word.
 const LARGE: f64 = 5e8;
 
-/// Nanoseconds of a sample of a run, without and with the state-based estimator: roughly, for a plant of few
-/// states on a processor of today.
-const PER_SAMPLE: f64 = 6e-6;
+/// Seconds that a sample of a run takes: roughly, for a plant of few states on a processor of today.
+const PER_SAMPLE: f64 = 3e-6;
 
 /// Says what will take long or much, and refuses what no usual machine has.
 pub fn announce(

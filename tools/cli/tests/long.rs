@@ -1,4 +1,6 @@
 //! Long scenarios: what they take is said before the design begins, and memory does not grow with them.
+//!
+//! promise: long-scenarios
 
 mod common;
 

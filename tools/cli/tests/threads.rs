@@ -1,4 +1,6 @@
 //! Any number of threads makes the same design, to the byte.
+//!
+//! promise: any-threads
 
 mod common;
 
