@@ -5,7 +5,7 @@
 
 mod common;
 
-use common::{Bench, FILE};
+use common::{Bench, FILE, SOUND};
 use std::fs;
 
 const DESIGN: &str = r#"
