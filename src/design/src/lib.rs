@@ -28,6 +28,7 @@
 // Without the solver, what only a synthesis needs is never called.
 #![cfg_attr(not(feature = "solver"), allow(dead_code))]
 
+pub mod apart;
 #[cfg(feature = "solver")]
 pub mod as_printed;
 #[cfg(feature = "solver")]
@@ -73,7 +74,7 @@ pub use blocks::{BlockKind, BlockName};
 pub use certificate::{CertificateError, ControlCertificate};
 pub use controllability::{Uncontrollable, check_controllable};
 #[cfg(feature = "solver")]
-pub use hypotheses::HypothesesSpec;
+pub use hypotheses::{HypothesesSpec, MODE_LENGTH};
 pub use lyapunov::{DwellTime, Lyapunov};
 pub use matrices::{dense, mode_models, plain};
 pub use observer::{LostCertificate, ObserverCertificate, ObserverDesign};

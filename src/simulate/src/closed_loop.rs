@@ -11,9 +11,9 @@ use serde::Serialize;
 pub enum Variant {
     /// The design as it is: faults estimated and compensated.
     Ftc,
-    /// The same gains, believing every sensor.
+    /// The same gains, believing every sensor, told the mode.
     NoFtc,
-    /// The same gains, told the true fault: what a perfect estimate of it would give. One that also
+    /// The same gains, told the true fault and the mode: what a perfect estimate of it would give. One that also
     /// takes up disturbance or noise may do better.
     ToldTheFault,
     /// The additive FTC of the paper's section III: gains of Theorem 1, no attenuation.
@@ -62,6 +62,8 @@ pub struct Report<'a> {
     pub residual: &'a [f64],
     /// Declared faults (p).
     pub flagged: &'a [bool],
+    /// The mode (0-based) found from the readings, where it is not told.
+    pub mode: Option<usize>,
 }
 
 /// Every signal of one sample.
@@ -96,6 +98,8 @@ pub struct Record {
     pub residual: Vec<f64>,
     /// Declared faults (p).
     pub flagged: Vec<bool>,
+    /// The mode (0-based) found from the readings, where it is not told.
+    pub mode_hat: Option<usize>,
 }
 
 /// One run.
@@ -140,6 +144,10 @@ impl Regulator for Tolerant<'_> {
             .sample(seen.tick, seen.told, &seen.y, &seen.reference)
             .and_then(|sample| sample.compensating(compensate))
             .expect("plant and controller have the same sizes");
+        let sample = match self.variant {
+            Variant::NoFtc | Variant::ToldTheFault => sample.telling_the_mode(),
+            _ => sample,
+        };
         self.controller.tick(&mut self.state, &sample);
     }
 
@@ -154,6 +162,10 @@ impl Regulator for Tolerant<'_> {
             fault: &estimator.fault,
             residual: &estimator.residual,
             flagged: &estimator.flagged,
+            mode: match self.variant {
+                Variant::NoFtc | Variant::ToldTheFault => None,
+                _ => self.controller.found_mode(&self.state),
+            },
         }
     }
 }
@@ -363,10 +375,52 @@ fn record(plant: &PlantState, regulator: &dyn Regulator) -> Record {
         f_hat: report.fault.to_vec(),
         residual: report.residual.to_vec(),
         flagged: report.flagged.to_vec(),
+        mode_hat: report.mode,
+    }
+}
+
+/// Samples in which another mode was found from the readings than the plant was in.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[non_exhaustive]
+pub struct WrongModes {
+    /// How many.
+    pub samples: u64,
+    /// Most in a row.
+    pub longest: u64,
+}
+
+/// [`WrongModes`], gathered sample by sample.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct ModeWatch {
+    found: bool,
+    wrong: WrongModes,
+    row: u64,
+}
+
+impl ModeWatch {
+    /// Looks at a sample.
+    pub fn see(&mut self, record: &Record) {
+        self.found |= record.mode_hat.is_some();
+        let wrong = record.mode_hat.is_some_and(|mode| mode != record.mode);
+        self.row = if wrong { self.row + 1 } else { 0 };
+        self.wrong.samples += u64::from(wrong);
+        self.wrong.longest = self.wrong.longest.max(self.row);
+    }
+
+    /// How often another mode was found than the plant was in; none where the mode was told.
+    pub fn wrong_modes(&self) -> Option<WrongModes> {
+        self.found.then_some(self.wrong)
     }
 }
 
 impl Trajectory {
+    /// How often another mode was found than the plant was in; none where the mode was told.
+    pub fn wrong_modes(&self) -> Option<WrongModes> {
+        let mut watch = ModeWatch::default();
+        self.records.iter().for_each(|record| watch.see(record));
+        watch.wrong_modes()
+    }
+
     /// Figures of merit of each tracked output (rows of `tracked`, 0-based), as far as the plant could
     /// be integrated.
     pub fn merits(&self, tracked: &[usize]) -> Vec<Merits> {

@@ -78,6 +78,9 @@ impl Columns {
                 add(format!("{key}.{name}"), reading(record).len());
             }
             add(format!("{key}.fault"), record.flagged.len());
+            if record.mode_hat.is_some() {
+                add(format!("{key}.mode_hat"), 0);
+            }
         }
         self.variants = runs.iter().map(|(variant, _)| variant.key()).collect();
     }
@@ -110,6 +113,9 @@ impl Samples for Columns {
             }
             let flags = record.flagged.iter().map(|&flag| f64::from(u8::from(flag)));
             put(&flags.collect::<Vec<f64>>());
+            if let Some(mode) = record.mode_hat {
+                put(&[(mode + 1) as f64]);
+            }
         }
         Ok(())
     }

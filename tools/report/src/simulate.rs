@@ -273,6 +273,7 @@ impl<W: Write> Samples for TableOfSamples<W> {
             }
             let flags = record.flagged.iter();
             row.extend(flags.map(|&flag| u8::from(flag).to_string()));
+            row.extend(record.mode_hat.map(|mode| (mode + 1).to_string()));
         }
         match &mut self.table {
             Some(table) => table.row(&*row).map_err(unwritten),
@@ -330,26 +331,34 @@ fn header(record: &Record, runs: &[(Variant, Record)]) -> Vec<String> {
     for (name, values) in shared(record) {
         names.extend(vector("", name, values.len()));
     }
-    for (variant, _) in runs {
+    for (variant, record) in runs {
         let prefix = format!("{}.", variant.key());
         for (name, values) in own(record) {
             names.extend(vector(&prefix, name, values.len()));
         }
         names.extend(vector(&prefix, "fault", record.flagged.len()));
+        if record.mode_hat.is_some() {
+            names.push(format!("{prefix}mode_hat"));
+        }
     }
     names
 }
 
 /// Per variant `mse` and `vaf`, each measured and true, one number per tracked output; of the
-/// deadbeat bound the true `mse` alone. Beside them the `warnings`, one sentence each.
+/// deadbeat bound the true `mse` alone. Where the mode is found from the readings, in how many samples
+/// another was found than the plant was in, and at most how many in a row. Beside them the `warnings`, one
+/// sentence each.
 fn metrics(runs: &[Digest], bound: Option<&[f64]>, warnings: &[String]) -> String {
     let of = |run: &Digest| {
         let merits = run.merits();
         let list = |pick: fn(&Merits) -> f64| merits.iter().map(pick).collect::<Vec<f64>>();
-        let value = json!({
+        let mut value = json!({
             "mse": { "measured": list(|m| m.measured.mse), "true": list(|m| m.truth.mse) },
             "vaf": { "measured": list(|m| m.measured.vaf), "true": list(|m| m.truth.vaf) },
         });
+        if let Some(wrong) = run.wrong_modes() {
+            value["wrong_mode"] = json!({ "samples": wrong.samples, "longest": wrong.longest });
+        }
         (run.variant.key().to_string(), value)
     };
     let mut variants: Map<String, Value> = runs.iter().map(of).collect();
@@ -403,6 +412,13 @@ fn summary(design: &Design, runs: &[Digest], bound: Option<&[f64]>) -> String {
     for (mse, &output) in bound.unwrap_or_default().iter().zip(tracked) {
         let name = &design.signals.outputs[output].name;
         let _ = writeln!(text, "{BOUND:<16}{name:<12}{:>14}{mse:>14.5e}", "");
+    }
+    for wrong in runs.iter().filter_map(Digest::wrong_modes) {
+        let _ = writeln!(
+            text,
+            "\nmode found from the readings: another than the plant's in {} samples, at most {} in a row",
+            wrong.samples, wrong.longest
+        );
     }
     if constant {
         text.push_str(

@@ -165,6 +165,15 @@ fn of_warning(file: &DesignFile, design: &Design, warning: &Warning) -> String {
              lasts at least {needed}: let modes last longer, or leave bumpless out",
             count(shortest as usize, "sample")
         ),
+        Warning::ModesAlike(pair) => {
+            let [one, other] = pair.modes.map(|mode| &design.plant.modes[mode].name);
+            format!(
+                "estimator.mode = \"estimated\": modes \"{one}\" and \"{other}\" are not told apart: while states and \
+                 inputs move by their nominal values, their readings differ by at most {} standard deviations of the \
+                 noise: measure more, or tell the mode",
+                number(pair.deviations)
+            )
+        }
         Warning::CostlyObserver {
             mode,
             running,

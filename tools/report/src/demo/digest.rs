@@ -3,7 +3,7 @@
 use super::events::{AlarmWatch, Alarms, Intervals, is_faulty};
 use crate::decimate::{Point, Thinned};
 use ftc_design::Design;
-use ftc_simulate::closed_loop::{MeritSums, Merits, Record};
+use ftc_simulate::closed_loop::{MeritSums, Merits, ModeWatch, Record, WrongModes};
 use ftc_simulate::{Trajectory, Variant};
 
 /// One run as the page shows it.
@@ -17,6 +17,7 @@ pub struct Digest {
     /// Per sensor, and of any.
     faulty: (Vec<Intervals>, Intervals),
     alarms: AlarmWatch,
+    found_modes: ModeWatch,
     /// Modes that were active, in ascending order.
     modes: Vec<usize>,
     /// Ticks at which another mode (0-based) becomes active; the first entry is the start.
@@ -63,6 +64,7 @@ impl Digest {
                 Intervals::default(),
             ),
             alarms: AlarmWatch::new(dims.outputs),
+            found_modes: ModeWatch::default(),
             modes: Vec::new(),
             switches: Vec::new(),
             reference: Vec::new(),
@@ -103,6 +105,7 @@ impl Digest {
         }
         self.faulty.1.see(tick, any);
         self.alarms.see(record);
+        self.found_modes.see(record);
         if self
             .switches
             .last()
@@ -150,6 +153,11 @@ impl Digest {
     /// How well faults were found.
     pub fn alarms(&self) -> Alarms {
         self.alarms.alarms()
+    }
+
+    /// How often another mode was found than the plant was in; none where the mode was told.
+    pub fn wrong_modes(&self) -> Option<WrongModes> {
+        self.found_modes.wrong_modes()
     }
 
     /// How many different modes were active.
