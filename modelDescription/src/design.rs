@@ -94,6 +94,7 @@ impl From<&Design> for Interface {
             tracked: design.controller.feedback.tracked.clone(),
             disturbances: disturbances(design, plant.dimensions().disturbances),
             modes: plant.modes.len(),
+            finds_the_mode: design.controller.estimator.finds_the_mode(),
             thresholds: design.controller.estimator.thresholds.clone(),
         }
     }

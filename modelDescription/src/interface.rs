@@ -45,6 +45,8 @@ pub struct Interface {
     pub disturbances: Vec<SignalInfo>,
     /// Number of modes.
     pub modes: usize,
+    /// Whether the controller finds the active mode from the readings; else it is told.
+    pub finds_the_mode: bool,
     /// Residual thresholds at the start (p).
     pub thresholds: Vec<f64>,
 }
@@ -52,7 +54,8 @@ pub struct Interface {
 /// The controller's variables.
 ///
 /// Inputs `y`, `y_ref`, `mode`, `mode_real`; outputs `u`, `x_hat`, `f_hat`, `residual`, `fault`,
-/// `fault_real`; tunable parameters `ftc_enabled`, `threshold`.
+/// `fault_real`; tunable parameters `ftc_enabled`, `threshold`. Where the controller finds the mode,
+/// it has no such inputs, but outputs `mode_hat`, `mode_hat_real`, `mode_probability`.
 pub fn controller(interface: &Interface) -> VariableTable {
     let inputs = &named("u", &interface.inputs);
     let outputs = &named("y", &interface.outputs);
@@ -69,8 +72,12 @@ pub fn controller(interface: &Interface) -> VariableTable {
         &references,
         Range::Closed,
     ));
-    let mode = table.push(input.mode("mode", Role::Mode, "Active mode", interface.modes));
-    let real = table.push(input.mode_real("mode_real", Role::ModeReal, interface.modes));
+    let mut told = Vec::new();
+    if !interface.finds_the_mode {
+        let mode = table.push(input.mode("mode", Role::Mode, "Active mode", interface.modes));
+        let real = table.push(input.mode_real("mode_real", Role::ModeReal, interface.modes));
+        told.extend([scalar(mode), scalar(real)]);
+    }
 
     let output = Maker::output();
     table.extend(output.vector("u", "Command of", Role::Command, inputs, Range::Closed));
@@ -164,10 +171,15 @@ pub fn controller(interface: &Interface) -> VariableTable {
         )
     }));
 
-    let modes = vec![scalar(mode), scalar(real)];
+    if interface.finds_the_mode {
+        let what = "Mode that the readings fit";
+        table.push(output.mode("mode_hat", Role::ModeEstimate, what, interface.modes));
+        table.push(output.mode_real("mode_hat_real", Role::ModeEstimateReal, interface.modes));
+        table.extend((1..=interface.modes).map(|mode| output.probability(mode)));
+    }
     // Before the first tick nothing is computed but the operating point of the active mode.
     for role in [Role::Command, Role::StateEstimate] {
-        table.depend(role, |_| modes.clone());
+        table.depend(role, |_| told.clone());
     }
     table
 }
@@ -492,6 +504,17 @@ impl Maker {
             phrase(what, name),
             kind,
             Role::FaultFlagReal,
+            0.0,
+        )
+    }
+
+    /// How likely a mode is, counted from 1.
+    fn probability(&self, mode: usize) -> Variable {
+        self.variable(
+            format!("mode_probability[{mode}]"),
+            format!("Probability of mode {mode} given the readings"),
+            pure_number(Some(0.0), Some(1.0)),
+            Role::ModeProbability,
             0.0,
         )
     }

@@ -96,6 +96,12 @@ pub enum Role {
     LoadEstimate,
     /// `actuator_fault`, flags (m).
     ActuatorFault,
+    /// `mode_hat`, the mode that the readings fit, counted from 1.
+    ModeEstimate,
+    /// `mode_hat_real`, the same as a Real.
+    ModeEstimateReal,
+    /// `mode_probability`, of each mode.
+    ModeProbability,
     /// `ftc_enabled`, switches the compensation.
     FtcEnabled,
     /// `threshold`, of the residuals (p).

@@ -26,6 +26,7 @@ fn sized([n, m, p, r, s, modes]: [usize; 6]) -> Interface {
         tracked: (0..r).collect(),
         disturbances: anonymous(s),
         modes,
+        finds_the_mode: false,
         thresholds: vec![0.5; p],
     }
 }

@@ -25,6 +25,7 @@ fn interface() -> Interface {
         tracked: vec![1],
         disturbances: vec![signal("draught", "degC")],
         modes: 2,
+        finds_the_mode: false,
         thresholds: vec![0.25, 0.5],
     }
 }

@@ -43,6 +43,9 @@ struct Spans {
     model_valid: Span,
     load_estimate: Span,
     actuator_fault: Span,
+    /// The Integer and its Real twin.
+    mode_estimate: [Span; 2],
+    mode_probability: Span,
 }
 
 impl Spans {
@@ -63,13 +66,20 @@ impl Spans {
             model_valid: table.span(Role::ModelValid),
             load_estimate: table.span(Role::LoadEstimate),
             actuator_fault: table.span(Role::ActuatorFault),
+            mode_estimate: [Role::ModeEstimate, Role::ModeEstimateReal]
+                .map(|role| table.span(role)),
+            mode_probability: table.span(Role::ModeProbability),
         }
     }
 }
 
 impl ControllerFmu {
-    /// The active mode (0-based); the nearest, where the inputs have not passed their check.
+    /// The mode told (0-based); the nearest, where the inputs have not passed their check. Where none is
+    /// told, the one to begin with.
     fn mode(&self, values: &Values) -> usize {
+        if self.controller.finds_the_mode() {
+            return self.first_mode;
+        }
         nearest_mode(values, self.spans.mode, self.at_rest.len())
     }
 
@@ -116,6 +126,12 @@ impl ControllerFmu {
         }
         values.set(spans.load_estimate, &bank.load);
         values.set(spans.model_valid, &[f64::from(u8::from(bank.model_valid))]);
+        if let Some(mode) = self.controller.found_mode(state) {
+            for span in spans.mode_estimate {
+                values.set(span, &[(mode + 1) as f64]);
+            }
+            values.set(spans.mode_probability, &bank.probability);
+        }
     }
 }
 
@@ -163,6 +179,9 @@ impl Slave for ControllerFmu {
 
     fn check_inputs(&self, values: &Values) -> Result<Readiness, Refusal> {
         self.require_numbers(values)?;
+        if self.controller.finds_the_mode() {
+            return Ok(Readiness::Complete);
+        }
         let mode = self.spans.mode;
         let selected = selected_mode(&self.table, values, mode, self.at_rest.len())?;
         Ok(selected.map_or(Readiness::ModeUntold(mode[0].first), |_| {

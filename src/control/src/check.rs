@@ -1,6 +1,7 @@
 //! Whether every part of a controller has the size that the others ask for, and finite numbers.
 
 use crate::error::ControllerError;
+use crate::estimator::hypotheses::MOST_MODES;
 use crate::matrix::Matrix;
 use crate::parameters::{
     ControllerParameters, Estimator, EstimatorMethod, Harmonics, Hypotheses, Limits, Observer,
@@ -332,7 +333,13 @@ fn hypotheses(settings: &Hypotheses, sizes: Sizes) -> Checked {
             .all(|value| (0.0..=LARGEST_SIZE).contains(value));
         range(sensible, field, "must hold numbers from 0 to 1e50")?;
     }
+    range(
+        settings.mode_rate.is_none() || sizes.modes <= MOST_MODES,
+        "estimator.hypotheses.mode_rate",
+        "finds the mode of at most 9 modes",
+    )?;
     let rates = [
+        settings.mode_rate.unwrap_or(settings.load_rate),
         settings.fault_rate,
         settings.stuck_rate,
         settings.release_rate,

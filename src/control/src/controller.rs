@@ -48,6 +48,8 @@ pub struct Sample<'a> {
     thresholds: &'a [f64],
     /// Which fault to take out of the loop.
     compensate: Compensate<'a>,
+    /// Whether `mode` holds although the design finds the mode from the readings.
+    telling: bool,
 }
 
 impl<'a> Sample<'a> {
@@ -69,6 +71,14 @@ impl<'a> Sample<'a> {
             has_length("fault", fault, self.measurement.len())?;
         }
         Ok(Self { compensate, ..self })
+    }
+
+    /// The same sample, with its mode told to a controller that would find it from the readings.
+    pub fn telling_the_mode(self) -> Self {
+        Self {
+            telling: true,
+            ..self
+        }
     }
 }
 
@@ -170,8 +180,8 @@ impl Controller {
         })
     }
 
-    /// What a tick is told: its number `tick` counted from the start time, the active `mode` (0-based),
-    /// the `measurement` (p; a value that is not finite is a fault of that sensor) and the `reference`
+    /// What a tick is told: its number `tick` counted from the start time, the active `mode` (0-based;
+    /// of no account where the design [finds it](Self::finds_the_mode)), the `measurement` (p; a value that is not finite is a fault of that sensor) and the `reference`
     /// (r). Judged by the design's thresholds, and corrected by the fault estimate, unless
     /// [`Sample::with_thresholds`] and [`Sample::compensating`] say otherwise.
     ///
@@ -201,6 +211,7 @@ impl Controller {
             reference,
             thresholds: &self.parameters.estimator.thresholds,
             compensate: Compensate::Estimate,
+            telling: false,
         })
     }
 
@@ -251,22 +262,46 @@ impl Controller {
         state.repetition.hold();
     }
 
+    /// Whether the mode is found from the readings, not told.
+    pub fn finds_the_mode(&self) -> bool {
+        self.parameters.estimator.finds_the_mode()
+    }
+
+    /// The mode (0-based) found from the readings, if that is what the controller does.
+    pub fn found_mode(&self, state: &ControllerState) -> Option<usize> {
+        let found = state.bank.as_ref().map(|bank| bank.mode().0);
+        found.filter(|_| self.finds_the_mode())
+    }
+
     /// One tick: takes the sample and leaves the command in `state.command`.
     pub fn tick(&self, state: &mut ControllerState, sample: &Sample<'_>) {
-        let mode = sample.mode.min(self.modes.len().saturating_sub(1));
-        let (Some(model), Some(point)) = (self.modes.get(mode), self.parameters.modes.get(mode))
-        else {
-            return;
-        };
-        let left = self.enter(state, mode, sample.thresholds);
+        self.run(state, sample);
+    }
+
+    /// One tick; returns the modes just left and entered, the same where there was no switch.
+    fn run(&self, state: &mut ControllerState, sample: &Sample<'_>) -> [usize; 2] {
         let settings = &self.parameters.estimator;
+        let told = sample.mode.min(self.modes.len().saturating_sub(1));
         let readings = state
             .repetition
             .screen(sample.measurement, settings.stuck_after);
+        let mut mode = told;
+        let mut moved_by = None;
         if let (Some(bank), Some(judged)) = (&self.bank, &mut state.bank) {
-            bank.observe(judged, mode, readings, sample.thresholds);
+            bank.observe(judged, told, readings, sample.thresholds);
             state.estimator.adopt(settings, judged, readings);
-        } else {
+            if self.finds_the_mode() && !sample.telling {
+                let (found, before) = judged.mode();
+                (mode, moved_by) = (found, Some(before));
+            }
+        }
+        let (Some(model), Some(point)) = (self.modes.get(mode), self.parameters.modes.get(mode))
+        else {
+            return [told; 2];
+        };
+        let left = self.enter(state, mode, moved_by, sample.thresholds);
+        if self.bank.is_none() {
+            let readings = state.repetition.screened();
             let seen = Observation {
                 tick: sample.tick,
                 mode,
@@ -294,6 +329,7 @@ impl Controller {
         self.command(state, mode, point, sample);
         self.advance(state, model, mode, sample);
         self.watch_delay(state, model, (left, mode), sample.measurement);
+        [left, mode]
     }
 
     /// The delay that the readings fit, if it is another than the design's.
@@ -328,15 +364,36 @@ impl Controller {
         sound && state.same_shape(&self.initial_state(0))
     }
 
-    /// Notes the mode and returns the one just left.
-    fn enter(&self, state: &mut ControllerState, mode: usize, thresholds: &[f64]) -> usize {
+    /// Notes the mode and returns the one just left. A switch that was found a sample late, the plant
+    /// having been `moved_by` the mode entered, is made up for: the observer predicts once more.
+    fn enter(
+        &self,
+        state: &mut ControllerState,
+        mode: usize,
+        moved_by: Option<usize>,
+        thresholds: &[f64],
+    ) -> usize {
+        let first = state.mode.is_none();
         let left = state.mode.replace(mode).unwrap_or(mode);
-        if left != mode {
-            state
-                .estimator
-                .mode_entered(&self.parameters.estimator, left, mode, thresholds);
+        if let (true, Some(_), Some(point)) = (first, moved_by, self.parameters.modes.get(mode)) {
+            state.observer.rest_at(&point.x0);
         }
-        left
+        if left == mode {
+            return left;
+        }
+        state
+            .estimator
+            .mode_entered(&self.parameters.estimator, left, mode, thresholds);
+        let late = moved_by == Some(mode);
+        let gain = self.parameters.observer.gains.get(mode);
+        let (true, Some(gain), Some(model)) = (late, gain, self.modes.get(mode)) else {
+            return left;
+        };
+        let corrected = &state.corrected;
+        state
+            .observer
+            .predict(gain, model, &state.acting, corrected);
+        mode
     }
 
     /// Whether the estimate is what is subtracted from the measurement.

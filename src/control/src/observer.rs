@@ -98,6 +98,12 @@ impl ObserverState {
         }
     }
 
+    /// Predicts rest at `x0` (n).
+    pub fn rest_at(&mut self, x0: &[f64]) {
+        kernel::copy(&mut self.prior, x0);
+        self.injection.fill(0.0);
+    }
+
     /// The state predicted for the next measurement (n).
     pub fn predicted(&self) -> &[f64] {
         &self.prior

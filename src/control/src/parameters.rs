@@ -212,6 +212,12 @@ pub struct Estimator {
 }
 
 impl Estimator {
+    /// Whether the mode is found from the readings.
+    pub fn finds_the_mode(&self) -> bool {
+        let settings = self.hypotheses.as_ref().map(|found| found.mode_rate);
+        self.method == EstimatorMethod::Observer && settings.flatten().is_some()
+    }
+
     /// The largest fault estimate of each sensor (p), output units.
     pub fn authority(&self) -> &[f64] {
         let hypotheses = self.hypotheses.as_ref();
@@ -246,6 +252,9 @@ pub struct Hypotheses {
     pub load_rate: f64,
     /// Relative error of the matrices of a plant that is no longer the model.
     pub changed_error: f64,
+    /// Switches per sample where the mode is found from the readings; none where it is told.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub mode_rate: Option<f64>,
     /// Log odds that an accusation must have against the best explanation without one.
     pub odds: f64,
     /// Standard deviation of a new fault (p), output units.

@@ -26,8 +26,9 @@ const FARTHEST: f64 = 1e6;
 const LARGEST_THRESHOLD: f64 = 1e3;
 
 /// Numbers of a design that `verify` holds against bounds only, in words for its report.
-pub const UNCOVERED: [&str; 6] = [
+pub const UNCOVERED: [&str; 7] = [
     "what the user tells the state-based estimator: model error, fault rate and length, largest correction, loads, the disturbance's size and period",
+    "that the mode, told or found from the readings, is the plant's (the claims hold while it is)",
     "the values of the operating points (any are admissible: the claims are about deviations from them)",
     "the ranges of the inputs (the claims hold while no input is at a limit)",
     "the coefficients of the fault estimator's predictors and its thresholds, debounce and learning (the claims hold \
@@ -244,7 +245,7 @@ fn check_estimator(design: &Design) -> Result<(), CoverageError> {
 }
 
 /// The sizes and rates of the state-based estimator follow from the plant, the signals, and what
-/// the user may choose: model error, fault rate and length, authority, loads, policy, disturbance.
+/// the user may choose: model error, fault rate and length, authority, loads, policy, mode length, disturbance.
 fn hypotheses_fit(design: &Design) -> bool {
     let estimator = &design.controller.estimator;
     let Some(found) = &estimator.hypotheses else {
@@ -256,6 +257,7 @@ fn hypotheses_fit(design: &Design) -> bool {
         fault_rate: found.fault_rate,
         fault_length: 1.0 / found.release_rate,
         ambiguous: found.ambiguous,
+        mode_length: found.mode_rate.map(f64::recip),
         authority: Some(found.authority.clone()),
         input_load: Some(found.input_load.clone()),
     };
@@ -272,9 +274,13 @@ fn hypotheses_fit(design: &Design) -> bool {
     let same_turns = turns.clone().all(|(a, b)| (a - b).abs() <= 1e-12 * a.abs());
     derived.angles.clone_from(&found.angles);
     derived.release_rate = found.release_rate;
+    derived.mode_rate = found.mode_rate;
     let chosen = (0.0..=1.0).contains(&found.model_error)
         && (1e-12..=0.1).contains(&found.fault_rate)
-        && (1e-9..=0.5).contains(&found.release_rate);
+        && (1e-9..=0.5).contains(&found.release_rate)
+        && found
+            .mode_rate
+            .is_none_or(|rate| (1e-9..=0.5).contains(&rate));
     same_turns && chosen && derived == *found
 }
 

@@ -16,11 +16,16 @@ pub struct HypothesesSpec {
     pub fault_length: f64,
     /// What is done about a slow divergence.
     pub ambiguous: Ambiguous,
+    /// Mean length of a mode in samples, where the mode is to be found from the readings; it is told when absent.
+    pub mode_length: Option<f64>,
     /// Largest correction of each sensor (p), output units; the sensor's range when absent.
     pub authority: Option<Vec<f64>>,
     /// Size of a load on each input (m), input units; a fifth of the nominal value when absent.
     pub input_load: Option<Vec<f64>>,
 }
+
+/// Mean length of a mode in samples, where none is given.
+pub const MODE_LENGTH: f64 = 500.0;
 
 impl Default for HypothesesSpec {
     fn default() -> Self {
@@ -29,6 +34,7 @@ impl Default for HypothesesSpec {
             fault_rate: 1e-5,
             fault_length: 1000.0,
             ambiguous: Ambiguous::TrustSensors,
+            mode_length: None,
             authority: None,
             input_load: None,
         }
@@ -109,6 +115,7 @@ impl HypothesesSpec {
             change_rate: CHANGE_RATE,
             load_rate: LOAD_RATE,
             changed_error: CHANGED_ERROR,
+            mode_rate: self.mode_length.map(f64::recip),
             odds: ODDS,
             fault_size: per_sensor(plant, outputs, FAULT_OF_RANGE, FAULT_SIZE),
             fault_walk: FAULT_WALK,

@@ -4,6 +4,9 @@
 //! default). The solver links eight symbols of a BLAS and LAPACK: leave the feature `lapack` off in a
 //! program that links one, switch it on in a program that does not.
 //!
+//! Inside a thread pool of `rayon` (`pool.install(|| ...)`) parts that are independent, such as the modes under
+//! `dwell`, are worked on at the same time, with the same result to the bit.
+//!
 //! ```
 //! use ftc_design::{ControlSpec, state_feedback};
 //! use ftc_plant::{Mode, SwitchedPlant, scaling::Scaling};
@@ -25,6 +28,7 @@
 // Without the solver, what only a synthesis needs is never called.
 #![cfg_attr(not(feature = "solver"), allow(dead_code))]
 
+pub mod apart;
 #[cfg(feature = "solver")]
 pub mod as_printed;
 #[cfg(feature = "solver")]
@@ -48,6 +52,7 @@ pub mod lmi;
 mod lyapunov;
 mod matrices;
 pub mod observer;
+mod parallel;
 mod proof;
 mod record;
 mod request;
@@ -69,7 +74,7 @@ pub use blocks::{BlockKind, BlockName};
 pub use certificate::{CertificateError, ControlCertificate};
 pub use controllability::{Uncontrollable, check_controllable};
 #[cfg(feature = "solver")]
-pub use hypotheses::HypothesesSpec;
+pub use hypotheses::{HypothesesSpec, MODE_LENGTH};
 pub use lyapunov::{DwellTime, Lyapunov};
 pub use matrices::{dense, mode_models, plain};
 pub use observer::{LostCertificate, ObserverCertificate, ObserverDesign};

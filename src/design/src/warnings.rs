@@ -2,6 +2,7 @@
 //!
 //! A warning is no error: nothing that was proved depends on it.
 
+use crate::apart::{self, Apart};
 use crate::assembly::DatabaseSource;
 use crate::commissioning::{Database, model_predictor};
 use crate::record::Design;
@@ -71,6 +72,8 @@ pub enum Warning {
         /// How many times wider thresholds are there.
         widening: f64,
     },
+    /// Two modes are not told apart by the readings, though the mode is to be found from them.
+    ModesAlike(Apart),
     /// The response in a log is not that of the model.
     DoubtfulLog {
         /// The mode.
@@ -150,6 +153,9 @@ pub fn of_design(design: &Design, logged: Option<&LoggedMovement>) -> Vec<Warnin
     warnings.extend(durations.too_short_to_judge(&design.controller.estimator));
     warnings.extend(durations.too_short_to_be_proved(design));
     warnings.extend(durations.too_short_for_transfer(design));
+    let alike = apart::pairs(design).into_iter();
+    let alike = alike.filter(|pair| pair.deviations < apart::ENOUGH);
+    warnings.extend(alike.map(Warning::ModesAlike));
     warnings.extend(costly_observer(design));
     warnings.extend(outside_the_database(design));
     if let Some(logged) = logged {

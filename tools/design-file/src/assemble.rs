@@ -15,6 +15,7 @@ use crate::schema::{
 use crate::signal::Tables;
 use crate::true_plant;
 use crate::values::NumberOrList;
+use ftc_control::estimator::hypotheses::MOST_MODES;
 use ftc_control::parameters;
 use ftc_design::assembly::{KnownDisturbance, Request};
 use ftc_design::{ControlSpec, Lyapunov, Objective, ObserverSpec, Signal, Signals};
@@ -56,6 +57,12 @@ pub(crate) fn request(file: &DesignFile, folder: &Path, notes: &Notes) -> Result
         notes,
     };
     let estimator = estimator(&file.estimator, disturbance, dims, &logs)?;
+    if estimator.hypotheses.mode_length.is_some() && plant.modes.len() > MOST_MODES {
+        return Err(format!(
+            "estimator.mode = \"estimated\" finds one of at most {MOST_MODES} modes, but the plant has {}: tell the mode",
+            plant.modes.len()
+        ));
+    }
     let scenario = ScenarioContext {
         scenario: &file.scenario,
         known: estimator.disturbance.as_ref(),

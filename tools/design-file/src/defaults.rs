@@ -32,6 +32,7 @@
 //! | `estimator.authority` | the sensor's range `max - min`; without one 2.5 times its nominal value and twice its largest operating point |
 //! | `estimator.input_load` | a fifth of the input's nominal value |
 //! | `estimator.model_error`, `fault_rate`, `fault_length`, `ambiguous` | 0.05, 1e-5 a sample, 1000 samples, `trust-sensors` |
+//! | `estimator.mode`, `mode_length` | `told`; 500 samples where it is `estimated` |
 //! | `estimator.response_length` | until the response has decayed to 1e-7 of itself |
 //! | `estimator.threshold` | from `sigmas`, and at least a thousandth of the nominal value of the output |
 //! | `compensation.method` | `virtual-sensor` |

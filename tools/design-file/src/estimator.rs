@@ -6,8 +6,8 @@ use crate::healthy_log::Logs;
 use crate::schema::{self, EstimatorMethod};
 use crate::values::{NameOrList, NumberOrList};
 use ftc_control::parameters;
-use ftc_design::HypothesesSpec;
 use ftc_design::assembly::{DatabaseSource, EstimatorSpec, KnownDisturbance, Threshold};
+use ftc_design::{HypothesesSpec, MODE_LENGTH};
 use ftc_plant::Dimensions;
 
 /// The longest debounce in samples, and the most repetitions of a reading.
@@ -54,6 +54,13 @@ pub(crate) fn estimator(
             check::count(samples, 0, LONGEST_DEBOUNCE),
         )? as u32,
     };
+    let hypotheses = hypotheses(given, dims)?;
+    if hypotheses.mode_length.is_some() && method != parameters::EstimatorMethod::Observer {
+        return Err(
+            "estimator.mode = \"estimated\" is for method = \"observer\" only: change one of them"
+                .into(),
+        );
+    }
     Ok(EstimatorSpec {
         method,
         response_length,
@@ -63,7 +70,7 @@ pub(crate) fn estimator(
         stuck_after,
         adapt: given.adapt.unwrap_or(usual.adapt),
         disturbance,
-        hypotheses: hypotheses(given, dims)?,
+        hypotheses,
     })
 }
 
@@ -83,6 +90,17 @@ fn hypotheses(given: &schema::Estimator, dims: Dimensions) -> Result<HypothesesS
             at(key, check::each(&values, check::positive))?;
             Ok::<_, String>(Some(values))
         }
+    };
+    let estimated = given.mode == Some(schema::ModeSource::Estimated);
+    let mode_length = match (estimated, given.mode_length) {
+        (false, None) => None,
+        (false, Some(_)) => {
+            return Err(
+                "estimator.mode_length is given, but the mode is told: add mode = \"estimated\", or remove it"
+                    .into(),
+            );
+        }
+        (true, length) => Some(within("mode_length", length, MODE_LENGTH, 2.0, 1e9)?),
     };
     Ok(HypothesesSpec {
         model_error: within(
@@ -105,6 +123,7 @@ fn hypotheses(given: &schema::Estimator, dims: Dimensions) -> Result<HypothesesS
             Some(schema::Ambiguous::TrustSensors) => parameters::Ambiguous::TrustSensors,
             Some(schema::Ambiguous::TrustModel) => parameters::Ambiguous::TrustModel,
         },
+        mode_length,
         authority: sizes("estimator.authority", &given.authority, dims.outputs)?,
         input_load: sizes("estimator.input_load", &given.input_load, dims.inputs)?,
     })

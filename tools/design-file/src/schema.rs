@@ -283,10 +283,24 @@ pub struct Estimator {
     pub fault_length: Option<f64>,
     /// Whether sensors or model are used where a slow divergence could be a sensor's drift or a load.
     pub ambiguous: Option<Ambiguous>,
+    /// Whether the active mode is told, or found from the readings.
+    pub mode: Option<ModeSource>,
+    /// Mean length of a mode in samples, where it is found.
+    pub mode_length: Option<f64>,
     /// Largest correction, per sensor (number or p).
     pub authority: Option<NumberOrList>,
     /// Size of a load on each input (number or m).
     pub input_load: Option<NumberOrList>,
+}
+
+/// Values of `estimator.mode`.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum ModeSource {
+    /// An input of the controller.
+    Told,
+    /// The readings.
+    Estimated,
 }
 
 /// Values of `estimator.ambiguous`.

@@ -360,7 +360,9 @@ fn beside(slave: &Slave, design: &Design) -> Result<(), String> {
         let wanted: Vec<f64> = tracked.iter().map(|&k| around(k)).collect();
         slave.set_reals(measurement, &y)?;
         slave.set_reals(reference, &wanted)?;
-        slave.set_integer(mode_span, mode as Integer + 1)?;
+        if !controller.finds_the_mode() {
+            slave.set_integer(mode_span, mode as Integer + 1)?;
+        }
         if tick == 0 {
             slave.plain("fmi2ExitInitializationMode")?;
         }

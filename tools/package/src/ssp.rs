@@ -362,6 +362,7 @@ mod tests {
             tracked: vec![0, 2],
             disturbances: vec![SignalInfo::default()],
             modes: 2,
+            finds_the_mode: false,
             thresholds: vec![1.0; 3],
         };
         let component = |name: &'static str, table| Component {

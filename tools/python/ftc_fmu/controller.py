@@ -28,7 +28,7 @@ class Controller:
         Args:
             y: Measurement (p); a value that is not finite is a fault of that sensor.
             y_ref: Reference of the tracked outputs (r).
-            mode: Active mode, from 1.
+            mode: Active mode, from 1; of no account where the design finds it (`mode = "estimated"`).
 
         Returns:
             The command (m).
@@ -62,6 +62,16 @@ class Controller:
     def fault(self) -> np.ndarray:
         """Which sensors are called faulty (p)."""
         return np.array(self._core.fault(), dtype=bool)
+
+    @property
+    def mode_hat(self) -> int | None:
+        """The mode found from the readings, from 1; None where it is told."""
+        return self._core.mode_hat()
+
+    @property
+    def mode_probability(self) -> np.ndarray:
+        """How likely each mode is given the readings; empty where the mode is told."""
+        return np.array(self._core.mode_probability())
 
     @property
     def ftc_enabled(self) -> bool:

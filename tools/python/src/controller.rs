@@ -102,6 +102,16 @@ impl Controller {
         self.state.estimator.flagged.clone()
     }
 
+    /// Counted from 1.
+    fn mode_hat(&self) -> Option<usize> {
+        self.controller.found_mode(&self.state).map(|mode| mode + 1)
+    }
+
+    fn mode_probability(&self) -> Vec<f64> {
+        let found = self.mode_hat().and(self.state.bank.as_ref());
+        found.map_or_else(Vec::new, |bank| bank.probability.clone())
+    }
+
     fn ftc_enabled(&self) -> bool {
         self.ftc_enabled
     }

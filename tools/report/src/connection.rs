@@ -40,17 +40,8 @@ pub fn misfit(design: &Design) -> Option<String> {
 /// What a signal is, and where it goes: name, meaning, counterpart.
 type Signal = (&'static str, &'static str, &'static str);
 
-const CONTROLLER: [Signal; 10] = [
-    (
-        "y",
-        "input: the measured outputs",
-        "y of the plant, or your sensors",
-    ),
-    (
-        "y_ref",
-        "input: references of the tracked outputs",
-        "y_ref of the plant, or your set points",
-    ),
+/// The mode that a controller is told.
+const TOLD: [Signal; 2] = [
     (
         "mode",
         "Integer input: the active mode, counted from 1; 0 while it is not told: the controller rests until it is",
@@ -60,6 +51,34 @@ const CONTROLLER: [Signal; 10] = [
         "mode_real",
         "input: the mode as a Real, for tools that connect no Integer; 0 when not connected",
         "mode_real of the plant, instead of mode or beside it",
+    ),
+];
+
+/// The mode that a controller finds.
+const FOUND: [Signal; 3] = [
+    (
+        "mode_hat",
+        "Integer output: the mode that the readings fit, counted from 1; the controller is told none",
+        "to watch",
+    ),
+    ("mode_hat_real", "output: the same as a Real", "to watch"),
+    (
+        "mode_probability",
+        "output, one per mode: its probability given the readings",
+        "to watch",
+    ),
+];
+
+const CONTROLLER: [Signal; 12] = [
+    (
+        "y",
+        "input: the measured outputs",
+        "y of the plant, or your sensors",
+    ),
+    (
+        "y_ref",
+        "input: references of the tracked outputs",
+        "y_ref of the plant, or your set points",
     ),
     (
         "u",
@@ -73,6 +92,26 @@ const CONTROLLER: [Signal; 10] = [
     (
         "fault_real",
         "output: the flag as a Real, 1 or 0",
+        "to watch",
+    ),
+    (
+        "suspect",
+        "Boolean output: a slow divergence that a sensor's drift or a load explains",
+        "to watch",
+    ),
+    (
+        "model_valid",
+        "Boolean output: false while nothing that the estimator knows of explains the readings",
+        "to watch",
+    ),
+    (
+        "load_hat",
+        "output: what acts on the plant beside the command",
+        "to watch",
+    ),
+    (
+        "actuator_fault",
+        "Boolean output: that exceeds the size of a usual load",
         "to watch",
     ),
 ];
@@ -125,12 +164,21 @@ const PLANT: [Signal; 13] = [
     ("w", "output: disturbance in force", "to watch"),
 ];
 
+/// The controller's signals: the mode comes in, or is found.
+fn controller(design: &Design) -> Vec<Signal> {
+    let mode: &[Signal] = match design.controller.estimator.finds_the_mode() {
+        true => &FOUND,
+        false => &TOLD,
+    };
+    CONTROLLER.iter().chain(mode).copied().collect()
+}
+
 /// The section "How to connect" of an FMU's documentation.
 pub fn section(design: &Design, side: Side) -> Section {
     let te = design.plant.sample_time;
     let (signals, parameters): (&[Signal], &[(&str, &str)]) = match side {
         Side::Controller => (
-            &CONTROLLER,
+            &controller(design),
             &[
                 (
                     "ftc_enabled",

@@ -36,6 +36,14 @@ pub fn gains(design: &Design, proof: &Proof) -> Lines {
             ),
         ));
     }
+    if design.controller.estimator.finds_the_mode() {
+        lines.push((
+            "mode".to_owned(),
+            "all this is proved while the mode found is the plant's; nothing is proved of the samples in which it is \
+             another"
+                .into(),
+        ));
+    }
     lines.push((
         "holds".to_owned(),
         match &running.switching {

@@ -4,6 +4,7 @@ use crate::running_loop;
 use crate::text::{count, number};
 use crate::warnings;
 use ftc_control::parameters::{Compensation, EstimatorMethod, Hypotheses, ObserverKind};
+use ftc_design::apart;
 use ftc_design::augmented::assumes_input_disturbance;
 use ftc_design::running_loop::TransferCertificate;
 use ftc_design::{
@@ -163,6 +164,35 @@ fn ambiguous(settings: &Hypotheses) -> &'static str {
     }
 }
 
+/// How the mode is found, where it is not told.
+fn found_mode(design: &Design, settings: &Hypotheses) -> Vec<(String, String)> {
+    let Some(rate) = settings.mode_rate else {
+        return Vec::new();
+    };
+    let mut lines = vec![line(
+        "mode",
+        format!(
+            "found from the readings, a switch every {} samples is expected",
+            number(1.0 / rate)
+        ),
+    )];
+    let pairs = apart::pairs(design);
+    let closest = pairs
+        .iter()
+        .min_by(|a, b| a.deviations.total_cmp(&b.deviations));
+    lines.extend(closest.map(|pair| {
+        let [one, other] = pair.modes.map(|mode| &design.plant.modes[mode].name);
+        line(
+            "modes told apart",
+            format!(
+                "readings of {one} and {other} differ most by {} deviations of their noise at nominal movements",
+                number(pair.deviations)
+            ),
+        )
+    }));
+    lines
+}
+
 fn estimator(design: &Design) -> Vec<(String, String)> {
     let estimator = &design.controller.estimator;
     let method = match estimator.method {
@@ -189,6 +219,7 @@ fn estimator(design: &Design) -> Vec<(String, String)> {
             format!("{:e} a sample and sensor", settings.fault_rate),
         ));
         lines.push(line("slow divergence", ambiguous(settings)));
+        lines.extend(found_mode(design, settings));
         lines.push(line(
             "largest correction",
             with_units(&settings.authority, outputs),

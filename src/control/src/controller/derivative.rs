@@ -36,9 +36,7 @@ impl Controller {
         change: Change<'_>,
     ) {
         let dy = change.measurement;
-        let mode = sample.mode.min(self.modes.len().saturating_sub(1));
-        let left = trial.mode.unwrap_or(mode);
-        self.tick(trial, sample);
+        let [left, mode] = self.run(trial, sample);
         let (estimator, observer) = (&self.parameters.estimator, &self.parameters.observer);
         let screened = trial.repetition.screened();
         if let (Some(bank), Some(judged)) = (&self.bank, &mut trial.bank) {

@@ -222,6 +222,7 @@ impl Regulator for Predictive {
             fault: &self.silent,
             residual: self.offset.as_slice(),
             flagged: &self.calm,
+            mode: None,
         }
     }
 

@@ -70,8 +70,8 @@ pub(super) struct Candidates {
 }
 
 impl Candidates {
-    /// For `outputs` sensors and so many jumps of loads.
-    pub(super) fn new(outputs: usize, jumps: usize) -> Self {
+    /// For so many `slots`, `outputs` and jumps of loads.
+    pub(super) fn new(slots: usize, outputs: usize, jumps: usize) -> Self {
         let none = Candidate {
             score: 0.0,
             parent: 0,
@@ -79,7 +79,7 @@ impl Candidates {
             convinced: false,
         };
         Self {
-            list: vec![none; super::SLOTS * (6 + jumps + 6 * outputs + outputs * outputs)],
+            list: vec![none; slots * (6 + jumps + 6 * outputs + outputs * outputs)],
             count: 0,
         }
     }
@@ -109,13 +109,13 @@ impl crate::state::State for Candidates {
 
 impl Bank {
     /// Judges a sample that is not like the last.
-    pub(super) fn compete(&self, state: &mut BankState, model: &ModeModel, reading: Reading<'_>) {
+    pub(super) fn compete(&self, state: &mut BankState, reading: Reading<'_>) {
         state.candidates.count = 0;
         for slot in state.live.slots() {
-            self.propose(state, slot, model, reading);
+            self.propose(state, slot, self.model(state, slot), reading);
         }
         self.select(state);
-        self.instantiate(state, model, reading);
+        self.instantiate(state, reading);
     }
 
     /// Variance of what a plant unlike the model may have done to each state in a sample (n).
@@ -182,15 +182,16 @@ impl Bank {
         }
     }
 
-    /// Whom a candidate accuses, and whether the plant is no longer the model.
-    fn kind(&self, state: &BankState, candidate: &Candidate) -> (Sensors, bool) {
+    /// Whom a candidate accuses, whether the plant is no longer the model, and the plant's mode.
+    fn kind(&self, state: &BankState, candidate: &Candidate) -> (Sensors, bool, u32) {
         let parent = &state.slots[candidate.parent];
         let loose = match candidate.action {
             Action::Loosen => true,
             Action::Tighten => false,
             _ => parent.loose,
         };
-        (self.sets(parent, candidate.action).all(), loose)
+        let accused = self.sets(parent, candidate.action).all();
+        (accused, loose, parent.mode)
     }
 
     /// Keeps the best candidates, few of a kind, and always one in which the plant is the model and no sensor
@@ -214,7 +215,7 @@ impl Bank {
         for index in 0..state.candidates.count {
             let candidate = state.candidates.list[index];
             let kind = self.kind(state, &candidate);
-            let unaccused = kind == (0, false);
+            let unaccused = (kind.0, kind.1) == (0, false);
             let room = KEEP - usize::from(!plain);
             let stays = candidate.score >= best - margin && kept < room;
             if !stays && (plain || !unaccused) {
@@ -237,7 +238,7 @@ impl Bank {
     }
 
     /// The candidates that stay become the hypotheses in competition.
-    fn instantiate(&self, state: &mut BankState, model: &ModeModel, reading: Reading<'_>) {
+    fn instantiate(&self, state: &mut BankState, reading: Reading<'_>) {
         let mut next = Live::NONE;
         // Children first: they start from their parents' predictions.
         let mut free = 0;
@@ -251,6 +252,7 @@ impl Bank {
                 free += 1;
             }
             next.add(free);
+            let model = self.model(state, candidate.parent);
             self.take_effect(state, candidate, free, model, reading);
             let (seen, child) = (&mut state.seen[free], &state.slots[free]);
             seen.predict(self.layout, model, reading, child, self.output_error());
@@ -287,6 +289,7 @@ impl Bank {
     /// Whom to believe: an accusation must beat the best explanation without one by its odds.
     fn believe(&self, state: &mut BankState, reading: Reading<'_>) {
         let (p, fault) = (self.layout.p, self.layout.fault());
+        let mode = self.decide_mode(state);
         let mut best = state.live.first();
         let mut top = f64::NEG_INFINITY;
         for slot in state.live.slots() {
@@ -299,7 +302,7 @@ impl Bank {
             let fits = h.accused() == 0
                 || h.misfit < 3.0 * p as f64 + 6.0
                     && state.seen[slot].square < 20.0 + 4.0 * p as f64;
-            if h.convinced && fits && value > top {
+            if h.convinced && fits && h.mode as usize == mode && value > top {
                 top = value;
                 best = slot;
             }

@@ -111,7 +111,11 @@ impl Bank {
 }
 
 /// Two different slots at once.
-fn pair(slots: &mut [Hypothesis], from: usize, to: usize) -> (&Hypothesis, &mut Hypothesis) {
+pub(super) fn pair(
+    slots: &mut [Hypothesis],
+    from: usize,
+    to: usize,
+) -> (&Hypothesis, &mut Hypothesis) {
     if from < to {
         let (a, b) = slots.split_at_mut(to);
         (&a[from], &mut b[0])

@@ -40,6 +40,10 @@ pub struct Hypothesis {
     pub convinced: bool,
     /// Whether the plant is no longer the model.
     pub loose: bool,
+    /// The plant's mode (0-based).
+    pub mode: u32,
+    /// The mode that brought it from the last sample to this one (0-based).
+    pub moved_by: u32,
     /// Logarithm of its probability, up to a constant.
     pub score: f64,
     /// Running mean of how badly it fits.
@@ -81,7 +85,9 @@ pub struct Reading<'a> {
 crate::state!(Hypothesis {
     parts: [z, cov, before],
     constants: [],
-    counters: [additive, stuck, scaled, convinced, loose, score, misfit]
+    counters: [
+        additive, stuck, scaled, convinced, loose, mode, moved_by, score, misfit
+    ]
 });
 crate::state!(Innovation {
     parts: [r, output, rows, s, weights, white],
@@ -273,6 +279,8 @@ impl Hypothesis {
             scaled: 0,
             convinced: true,
             loose: false,
+            mode: 0,
+            moved_by: 0,
             score: 0.0,
             misfit: layout.p as f64,
         }
@@ -293,6 +301,8 @@ impl Hypothesis {
         self.scaled = other.scaled;
         self.convinced = other.convinced;
         self.loose = other.loose;
+        self.mode = other.mode;
+        self.moved_by = other.moved_by;
         self.score = other.score;
         self.misfit = other.misfit;
     }
@@ -346,6 +356,7 @@ impl Hypothesis {
     /// One sample on. `scratch` holds n rows of the covariance.
     pub fn advance(&mut self, step: &Step<'_>, scratch: &mut [f64]) {
         let active = self.active(step.layout, step.bias);
+        self.moved_by = self.mode;
         self.drift(step, scratch);
         self.propagate(step, active, scratch);
         self.move_state(step, scratch);

@@ -16,6 +16,7 @@ mod effect;
 mod hypothesis;
 mod linear;
 mod model;
+mod modes;
 mod own_run;
 mod propose;
 mod start;
@@ -37,8 +38,10 @@ use trial::Outlook;
 
 /// Most hypotheses that stay after a sample.
 const KEEP: usize = 12;
+/// Most modes where the mode is not told: each but the leading one needs a hypothesis.
+pub const MOST_MODES: usize = 9;
 /// Most hypotheses that may exist while a sample is judged.
-const SLOTS: usize = 2 * KEEP;
+const SLOTS: usize = 2 * KEEP + MOST_MODES - 1;
 /// Evidence of a frozen sensor from which it is considered, in log likelihood.
 const FREEZING: f64 = 4.0;
 /// What the very same reading says for a frozen sensor while the model's own run moves, in log likelihood.
@@ -69,6 +72,8 @@ pub struct Bank {
     /// Of each pair of the disturbance: the error of its angle, and the least growth of its variance.
     waves: Vec<(f64, f64)>,
     prices: Prices,
+    /// Whether a switch shows in the sample in which it happens (modes x modes).
+    at_once: Vec<bool>,
     /// Noise deviation of each sensor over its threshold (p).
     noise_per_threshold: Vec<f64>,
 }
@@ -82,6 +87,8 @@ struct Prices {
     change: f64,
     load: f64,
     changed: f64,
+    /// Where the mode is not told.
+    mode: Option<f64>,
 }
 
 /// The slots in use, the leading hypothesis first.
@@ -92,10 +99,6 @@ struct Live {
 }
 
 impl Live {
-    const ONE: Self = Self {
-        list: [0; SLOTS],
-        count: 1,
-    };
     const NONE: Self = Self {
         list: [0; SLOTS],
         count: 0,
@@ -127,9 +130,10 @@ impl Live {
     }
 
     /// Whether every slot exists, and each once.
-    fn sound(self) -> bool {
+    fn sound(self, slots: usize) -> bool {
         let mut seen = [false; SLOTS];
-        (1..=SLOTS).contains(&self.count)
+        let seen = &mut seen[..slots.min(SLOTS)];
+        (1..=seen.len()).contains(&self.count)
             && self.slots().all(|s| {
                 seen.get_mut(s)
                     .is_some_and(|seen| !core::mem::replace(seen, true))
@@ -147,7 +151,10 @@ pub struct BankState {
     scratch: Vec<f64>,
     outlook: Outlook,
     trial: Innovation,
-    mode: Option<usize>,
+    /// The plant's mode (0-based) by the leading hypothesis.
+    mode: usize,
+    /// The mode that moved the model's own run to this sample.
+    moved_by: u32,
     /// The input that acted last (m), and how it moved (m).
     u: Vec<f64>,
     moved: Vec<f64>,
@@ -185,6 +192,8 @@ pub struct BankState {
     pub model_valid: bool,
     /// What acts on the plant beside the command, as an input (m).
     pub load: Vec<f64>,
+    /// Of each mode its probability, where the mode is not told (modes).
+    pub probability: Vec<f64>,
     /// Inputs on which that exceeds the size of a usual load, as bits.
     pub actuator_fault: u64,
 }
@@ -210,12 +219,14 @@ crate::state!(BankState {
         own,
         expected,
         residual,
-        load
+        load,
+        probability
     ],
     constants: [],
     counters: [
         live,
         mode,
+        moved_by,
         first,
         noise_samples,
         best,
@@ -229,8 +240,8 @@ crate::state!(BankState {
 });
 
 impl Bank {
-    /// Judges the readings `y` (p) of a sample taken in `mode`; what is no measurement tells nothing.
-    /// A threshold other than the design's scales the noise of its sensor.
+    /// Judges the readings `y` (p) of a sample, taken in `mode` (0-based) unless the estimator finds it;
+    /// what is no measurement tells nothing. A threshold other than the design's scales the noise of its sensor.
     pub fn observe(&self, state: &mut BankState, mode: usize, y: &[f64], thresholds: &[f64]) {
         let mut noise = core::mem::take(&mut state.noise);
         let scales = thresholds.iter().zip(&self.noise_per_threshold);
@@ -258,48 +269,44 @@ impl Bank {
     fn judge(&self, state: &mut BankState, mode: usize, reading: Reading<'_>) {
         let layout = self.layout;
         let p = layout.p;
-        let model = &self.modes[mode];
-        if state.mode.is_some_and(|old| old != mode) {
-            self.enter(state, mode);
+        if self.prices.mode.is_none() {
+            self.tell(state, mode);
         }
-        state.mode = Some(mode);
         let bias = self.output_error();
         let z = &state.slots[state.best].z;
+        let model = self.model(state, state.best);
         state.own.read(model, &self.settings, z, reading.noise);
         for slot in state.live.slots() {
+            let model = self.model(state, slot);
             let h = &state.slots[slot];
             let seen = &mut state.seen[slot];
             seen.predict(layout, model, reading, h, bias);
         }
-        let alone = state.live.count == 1;
         let head = state.live.first();
         self.watch(state, head, reading);
         for slot in state.live.slots() {
             state.seen[slot].whiten(p);
         }
         let h = &state.slots[head];
-        let calm = alone
-            && h.accused() == 0
+        let calm = h.accused() == 0
             && !h.loose
             && state.seen[head].square < QUIET + 2.0 * p as f64
             && state.seen[head].sound
             && state.evidence.iter().all(|&e| e < FREEZING)
             && !state.first
             && state.apart == 0
-            && !(self.settings.trusts_model() && state.suspect != 0);
+            && !(self.settings.trusts_model() && state.suspect != 0)
+            && self.undisputed(state);
         if calm {
-            state.slots[head].update(layout, &mut state.seen[head], bias);
-            let h = &mut state.slots[head];
-            h.score = 0.0;
-            h.misfit += RENEWED * (state.seen[head].square - h.misfit);
-            state.best = head;
-            state.suspect = 0;
+            self.go_on(state);
         } else {
-            self.compete(state, model, reading);
+            self.compete(state, reading);
         }
         state.first = false;
+        state.mode = state.slots[state.best].mode as usize;
+        self.correct_own_run(state, reading);
         self.learn_noise(state, reading);
-        self.conclude(state, model, reading);
+        self.conclude(state, reading);
         let displaced = state.own.displaced(&state.expected, DISPLACED);
         state.apart = state.own.displaced(&state.expected, APART);
         state.own.learn(&state.expected);
@@ -329,34 +336,6 @@ impl Bank {
                 let ratio = &mut state.noise_ratio[q];
                 *ratio += *ratio * (relative - 1.0) / state.noise_samples;
                 *ratio = ratio.clamp(1.0, MOST_NOISE);
-            }
-        }
-    }
-
-    /// Another mode: what the model misses, and what a load does, may differ.
-    fn enter(&self, state: &mut BankState, mode: usize) {
-        let Layout { n, m, .. } = self.layout;
-        let stride = self.layout.stride();
-        let load = self.layout.load() + self.layout.state_load();
-        let model = &self.modes[mode];
-        let error = self.settings.model_error * self.settings.model_error;
-        for slot in state.live.slots() {
-            let h = &mut state.slots[slot];
-            let mean = dot(&h.z[load..load + n], &h.z[load..load + n]) / n.max(1) as f64;
-            for i in 0..n {
-                let off = h.z[i] - model.x0[i];
-                h.cov[i * stride + i] += error * off * off;
-                let mut sum = 0.0;
-                for j in 0..n {
-                    let v = model.a[i * n + j] * (h.z[j] - model.x0[j]);
-                    sum += v * v;
-                }
-                for j in 0..m {
-                    let v = model.b[i * m + j] * (state.u[j] - model.u0[j]);
-                    sum += v * v;
-                }
-                let k = load + i;
-                h.cov[k * stride + k] += error * sum + 2.0 * (h.z[k] * h.z[k]).max(mean);
             }
         }
     }
@@ -403,8 +382,25 @@ impl Bank {
         }
     }
 
-    fn conclude(&self, state: &mut BankState, model: &ModeModel, reading: Reading<'_>) {
+    /// The model's own run, where it moved in a mode that the plant was not in.
+    fn correct_own_run(&self, state: &mut BankState, reading: Reading<'_>) {
+        let best = &state.slots[state.best];
+        if best.moved_by == state.moved_by {
+            return;
+        }
+        state.moved_by = best.moved_by;
+        let moved = &self.modes[best.moved_by as usize];
+        let next = &mut state.scratch[..self.layout.n];
+        state.own.repeat(self.layout.m, moved, &state.u, next);
+        let model = &self.modes[state.mode];
+        state
+            .own
+            .read(model, &self.settings, &best.z, reading.noise);
+    }
+
+    fn conclude(&self, state: &mut BankState, reading: Reading<'_>) {
         let p = self.layout.p;
+        let model = &self.modes[state.mode];
         let h = &state.slots[state.best];
         for (q, expected) in state.expected.iter_mut().enumerate() {
             *expected = model.output(q, &h.z, &h.z);
@@ -450,7 +446,7 @@ impl Bank {
     pub fn differentiate(&self, state: &mut BankState, dy: &[f64]) {
         let Layout { n, p, d, .. } = self.layout;
         let stride = self.layout.stride();
-        let Some(model) = self.modes.get(state.mode.unwrap_or(0)) else {
+        let Some(model) = self.modes.get(state.mode) else {
             return;
         };
         let best = state.best;
@@ -475,7 +471,7 @@ impl Bank {
 
     /// One sample on, under the input that acts (m).
     pub fn advance(&self, state: &mut BankState, u: &[f64]) {
-        let model = &self.modes[state.mode.unwrap_or(0)];
+        let model = &self.modes[state.mode];
         for ((d, &new), old) in state.moved.iter_mut().zip(u).zip(&mut state.u) {
             *d = new - *old;
             *old = new;
@@ -483,7 +479,9 @@ impl Bank {
         let z = &state.slots[state.best].z;
         let next = &mut state.scratch[..self.layout.n];
         state.own.advance(self.layout.m, model, z, u, next);
-        let step = Step {
+        state.moved_by = state.mode as u32;
+        self.branch(state, false);
+        let mut step = Step {
             layout: self.layout,
             model,
             settings: &self.settings,
@@ -495,15 +493,27 @@ impl Bank {
             moved: &state.moved,
         };
         for slot in state.live.slots() {
+            step.model = &self.modes[state.slots[slot].mode as usize];
             state.slots[slot].advance(&step, &mut state.scratch);
         }
+        self.branch(state, true);
     }
 }
 
 impl BankState {
     /// Whether every index in it is one; a state that came as bytes may hold any.
     pub fn sound(&self) -> bool {
-        self.live.sound() && self.live.contains(self.best)
+        let modes = self.probability.len();
+        let exists = |h: &Hypothesis| h.mode.max(h.moved_by) < modes as u32;
+        self.live.sound(self.slots.len())
+            && self.live.contains(self.best)
+            && self.mode < modes
+            && self.slots.iter().all(exists)
+    }
+
+    /// The plant's mode (0-based) by the leading hypothesis, and the mode that moved it to this sample.
+    pub fn mode(&self) -> (usize, usize) {
+        (self.mode, self.best().moved_by as usize)
     }
 
     /// The hypotheses in competition.

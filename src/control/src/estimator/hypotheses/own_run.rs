@@ -21,6 +21,8 @@ const START: f64 = 3.0;
 pub(super) struct OwnRun {
     /// State (n).
     pub x: Vec<f64>,
+    /// State and disturbance before it moved (n + d).
+    before: Vec<f64>,
     /// Outputs (p).
     pub y: Vec<f64>,
     /// Their covariance that the model's error allows (p x p).
@@ -34,18 +36,19 @@ pub(super) struct OwnRun {
 }
 
 crate::state!(OwnRun {
-    parts: [x, y, bound, spread, error, allowed],
+    parts: [x, before, y, bound, spread, error, allowed],
     constants: [],
     counters: []
 });
 
 impl OwnRun {
-    /// At rest at the operating point.
-    pub fn new(model: &ModeModel, settings: &Settings) -> Self {
+    /// At rest at the operating point, beside `d` states of the disturbance.
+    pub fn new(model: &ModeModel, settings: &Settings, d: usize) -> Self {
         let error = settings.model_error * settings.model_error;
         let allowed: Vec<f64> = model.bias.iter().map(|square| error * square).collect();
         Self {
             x: model.x0.clone(),
+            before: vec![0.0; model.x0.len() + d],
             y: vec![0.0; model.bias.len()],
             bound: vec![0.0; model.bias.len() * model.bias.len()],
             spread: vec![0.0; model.bias.len()],
@@ -71,9 +74,19 @@ impl OwnRun {
 
     /// One sample on under the input `u` (m), with the disturbance as `z` (N) knows it. `next` holds n.
     pub fn advance(&mut self, m: usize, model: &ModeModel, z: &[f64], u: &[f64], next: &mut [f64]) {
+        let (states, waves) = self.before.split_at_mut(self.x.len());
+        states.copy_from_slice(&self.x);
+        waves.copy_from_slice(&z[states.len()..][..waves.len()]);
+        self.repeat(m, model, u, next);
+    }
+
+    /// The last sample once more, in another mode.
+    pub fn repeat(&mut self, m: usize, model: &ModeModel, u: &[f64], next: &mut [f64]) {
+        let before = &self.before;
         for (i, next) in next.iter_mut().enumerate() {
             let [own, waves, _] = model.motion.parts(i);
-            let mut sum = model.state_offset[i] + sparse_dot(own, &self.x) + sparse_dot(waves, z);
+            let mut sum =
+                model.state_offset[i] + sparse_dot(own, before) + sparse_dot(waves, before);
             sum += dot(&model.b[i * m..(i + 1) * m], u);
             *next = bounded(sum);
         }

@@ -4,9 +4,10 @@ use super::competition::{Candidates, UNLIKE};
 use super::hypothesis::{Hypothesis, Innovation};
 use super::linear::{axpy, factor, solve};
 use super::model::{Layout, ModeModel};
+use super::modes::differ_at_once;
 use super::own_run::OwnRun;
 use super::trial::Outlook;
-use super::{Bank, BankState, Live, NOISE_AT_START, NOISE_PRIOR, Prices, SLOTS};
+use super::{Bank, BankState, KEEP, Live, NOISE_AT_START, NOISE_PRIOR, Prices};
 use crate::matrix::Matrix;
 use crate::parameters::{Hypotheses, ModeModel as Described};
 use alloc::vec;
@@ -172,11 +173,18 @@ impl Bank {
                 .iter()
                 .map(|&angle| (libm::cos(angle), libm::sin(angle)))
         };
+        let modes: Vec<ModeModel> = described
+            .map(|mode| model(layout, mode, settings))
+            .collect();
+        let pairs = modes
+            .iter()
+            .flat_map(|one| modes.iter().map(move |other| (one, other)));
         Self {
             layout,
-            modes: described
-                .map(|mode| model(layout, mode, settings))
+            at_once: pairs
+                .map(|(one, other)| differ_at_once(one, other))
                 .collect(),
+            modes,
             rotation: (0..disturbances).flat_map(turn).collect(),
             waves: waves_of(settings, d),
             prices: Prices {
@@ -186,6 +194,7 @@ impl Bank {
                 change: ln(settings.change_rate),
                 load: ln(settings.load_rate),
                 changed: UNLIKE * ln(settings.load_rate),
+                mode: settings.mode_rate.map(ln),
             },
             noise_per_threshold: settings
                 .noise
@@ -203,40 +212,33 @@ impl Bank {
         self.layout.p > self.layout.n
     }
 
-    /// At rest at the operating point of `mode`.
+    /// At rest at the operating point of `mode`; where the mode is not told, that of any other may be
+    /// the plant's as well.
     pub fn start(&self, mode: usize) -> BankState {
         let layout = self.layout;
         let Layout { n, m, p, d, .. } = layout;
         let stride = layout.stride();
         let settings = &self.settings;
         let model = &self.modes[mode];
-        let mut first = Hypothesis::new(layout);
-        first.z[..n].copy_from_slice(&model.x0);
-        first.before.copy_from_slice(&model.x0);
-        let mut set = |k: usize, deviation: f64| first.cov[k * stride + k] = deviation * deviation;
-        for i in 0..n {
-            set(i, settings.start[i]);
-        }
-        for (k, size) in model.load_size.iter().enumerate() {
-            set(layout.load() + k, AT_REST * size);
-        }
-        for i in 0..d {
-            set(n + i, settings.disturbance_size[i]);
-        }
-        for j in 0..m {
-            set(layout.gain() + j, AT_REST * settings.gain_error);
-        }
-        let mut slots = vec![Hypothesis::new(layout); SLOTS];
-        slots[0] = first;
+        let others = (0..self.others()).map(|k| if k < mode { k } else { k + 1 });
+        let mut slots: Vec<Hypothesis> = core::iter::once(mode)
+            .chain(others)
+            .map(|mode| self.at_rest(mode))
+            .collect();
+        let mut live = Live::NONE;
+        (0..slots.len()).for_each(|slot| live.add(slot));
+        slots.resize(2 * KEEP + self.others(), Hypothesis::new(layout));
         BankState {
+            seen: vec![Innovation::new(layout); slots.len()],
+            candidates: Candidates::new(slots.len(), p, model.jumps.len()),
             slots,
-            seen: vec![Innovation::new(layout); SLOTS],
-            live: Live::ONE,
-            candidates: Candidates::new(p, model.jumps.len()),
+            live,
+            probability: vec![0.0; self.modes.len()],
             scratch: vec![0.0; n.max(1) * stride],
             outlook: Outlook::new(p),
             trial: Innovation::new(layout),
-            mode: None,
+            mode,
+            moved_by: mode as u32,
             u: model.u0.clone(),
             moved: vec![0.0; m],
             first: true,
@@ -252,7 +254,7 @@ impl Bank {
             best: 0,
             apart: 0,
             misfit: p as f64,
-            own: OwnRun::new(model, settings),
+            own: OwnRun::new(model, settings, d),
             expected: vec![0.0; p],
             residual: vec![0.0; p],
             accused: 0,
@@ -261,5 +263,31 @@ impl Bank {
             load: vec![0.0; m],
             actuator_fault: 0,
         }
+    }
+
+    /// The hypothesis that the plant is at rest at the operating point of `mode`.
+    fn at_rest(&self, mode: usize) -> Hypothesis {
+        let (layout, settings) = (self.layout, &self.settings);
+        let Layout { n, m, d, .. } = layout;
+        let stride = layout.stride();
+        let model = &self.modes[mode];
+        let mut rest = Hypothesis::new(layout);
+        (rest.mode, rest.moved_by) = (mode as u32, mode as u32);
+        rest.z[..n].copy_from_slice(&model.x0);
+        rest.before.copy_from_slice(&model.x0);
+        let mut set = |k: usize, deviation: f64| rest.cov[k * stride + k] = deviation * deviation;
+        for i in 0..n {
+            set(i, settings.start[i]);
+        }
+        for (k, size) in model.load_size.iter().enumerate() {
+            set(layout.load() + k, AT_REST * size);
+        }
+        for i in 0..d {
+            set(n + i, settings.disturbance_size[i]);
+        }
+        for j in 0..m {
+            set(layout.gain() + j, AT_REST * settings.gain_error);
+        }
+        rest
     }
 }

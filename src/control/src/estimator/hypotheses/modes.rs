@@ -1,0 +1,197 @@
+//! The plant's mode under each hypothesis: told with every sample, or found from the readings.
+//!
+//! Where it is not told, each sample may be the first in another mode, at the price of a switch: beside
+//! the leading hypothesis stands one for every other mode, made anew from it whenever it explains the
+//! readings much worse than a switch at this sample would. So the evidence for another mode sums up over
+//! samples, and begins again where it fails.
+
+use super::hypothesis::{Hypothesis, Innovation};
+use super::linear::dot;
+use super::model::{Layout, ModeModel};
+use super::{Bank, BankState, Live, RENEWED};
+
+/// How much worse than a switch now, in log likelihood, a switch earlier may explain the readings.
+const RESTART: f64 = 3.0;
+
+/// Whether two modes differ in what they make of one state, so that a switch shows in the sample of it.
+pub(super) fn differ_at_once(one: &ModeModel, other: &ModeModel) -> bool {
+    one.c != other.c || one.f != other.f || one.output_offset != other.output_offset
+}
+
+impl Bank {
+    /// How many other modes the plant may be in.
+    pub(super) fn others(&self) -> usize {
+        match self.prices.mode {
+            Some(_) => self.modes.len().saturating_sub(1),
+            None => 0,
+        }
+    }
+
+    /// The plant under the hypothesis in `slot`.
+    pub(super) fn model(&self, state: &BankState, slot: usize) -> &ModeModel {
+        &self.modes[state.slots[slot].mode as usize]
+    }
+
+    /// The plant is in `mode`, whatever else holds.
+    pub(super) fn tell(&self, state: &mut BankState, mode: usize) {
+        for slot in state.live.slots() {
+            let h = &mut state.slots[slot];
+            match state.first {
+                true => (h.mode, h.moved_by) = (mode as u32, mode as u32),
+                false if h.mode as usize != mode => self.enter(h, mode, &state.u),
+                false => {}
+            }
+        }
+    }
+
+    /// The plant enters `mode` under the input `u` (m): what the model misses, and what a load does, may
+    /// differ.
+    fn enter(&self, h: &mut Hypothesis, mode: usize, u: &[f64]) {
+        let Layout { n, m, .. } = self.layout;
+        let stride = self.layout.stride();
+        let load = self.layout.load() + self.layout.state_load();
+        let model = &self.modes[mode];
+        let error = self.settings.model_error * self.settings.model_error;
+        h.mode = mode as u32;
+        let mean = dot(&h.z[load..load + n], &h.z[load..load + n]) / n.max(1) as f64;
+        for i in 0..n {
+            let off = h.z[i] - model.x0[i];
+            h.cov[i * stride + i] += error * off * off;
+            let mut sum = 0.0;
+            for j in 0..n {
+                let v = model.a[i * n + j] * (h.z[j] - model.x0[j]);
+                sum += v * v;
+            }
+            for j in 0..m {
+                let v = model.b[i * m + j] * (u[j] - model.u0[j]);
+                sum += v * v;
+            }
+            let k = load + i;
+            h.cov[k * stride + k] += error * sum + 2.0 * (h.z[k] * h.z[k]).max(mean);
+        }
+    }
+
+    /// Whether nothing stands beside the leading hypothesis but others of its kind in other modes, and
+    /// explains the sample no better.
+    pub(super) fn undisputed(&self, state: &BankState) -> bool {
+        if state.live.count == 1 {
+            return true;
+        }
+        let p = self.layout.p;
+        let after = |slot: usize| state.slots[slot].score + state.seen[slot].likelihood(p);
+        let head = state.live.first();
+        let lead = after(head);
+        let mut rivals = state.live.slots().skip(1);
+        rivals.all(|slot| {
+            let (h, leading) = (&state.slots[slot], &state.slots[head]);
+            stands_for(h, leading, h.mode) && h.mode != leading.mode && after(slot) <= lead
+        })
+    }
+
+    /// All goes on under every hypothesis in competition.
+    pub(super) fn go_on(&self, state: &mut BankState) {
+        let (p, head) = (self.layout.p, state.live.first());
+        let likelihood = |seen: &Innovation| match state.live.count {
+            1 => 0.0,
+            _ => seen.likelihood(p),
+        };
+        let lead = state.slots[head].score + likelihood(&state.seen[head]);
+        for slot in state.live.slots() {
+            let (h, seen) = (&mut state.slots[slot], &mut state.seen[slot]);
+            h.score += likelihood(seen) - lead;
+            h.update(self.layout, seen, self.output_error());
+            h.misfit += RENEWED * (seen.square.min(1e3) - h.misfit);
+        }
+        state.slots[head].score = 0.0;
+        state.best = head;
+        state.suspect = 0;
+        if self.others() > 0 {
+            self.weigh_modes(state);
+        }
+    }
+
+    /// A hypothesis for every other mode: that the plant has entered it with this sample, or enters it now.
+    /// What shows at once is looked for once the state has `moved` to the coming sample, the rest before.
+    pub(super) fn branch(&self, state: &mut BankState, moved: bool) {
+        let Some(price) = self.prices.mode else {
+            return;
+        };
+        let head = state.live.first();
+        let (count, leading) = (self.modes.len(), state.slots[head].mode as usize);
+        for mode in (0..count).filter(|&mode| mode != leading) {
+            if self.at_once[leading * count + mode] != moved {
+                continue;
+            }
+            let lead = &state.slots[head];
+            let score = lead.score + price;
+            let standing = state.live.slots().skip(1);
+            let standing = standing
+                .filter(|&slot| stands_for(&state.slots[slot], lead, mode as u32))
+                .max_by(|&a, &b| state.slots[a].score.total_cmp(&state.slots[b].score));
+            let slot = match standing {
+                Some(slot) if state.slots[slot].score >= score - RESTART => continue,
+                Some(slot) => slot,
+                None => match free(state.live, state.slots.len()) {
+                    Some(slot) => slot,
+                    None => return,
+                },
+            };
+            let (parent, child) = super::effect::pair(&mut state.slots, head, slot);
+            child.take(parent);
+            child.score = score;
+            self.enter(child, mode, &state.u);
+            if standing.is_none() {
+                state.live.add(slot);
+            }
+        }
+    }
+
+    /// The mode (0-based) to believe in: another than before must have the odds of an accusation, all its
+    /// hypotheses together.
+    pub(super) fn decide_mode(&self, state: &mut BankState) -> usize {
+        if self.others() == 0 {
+            return state.slots[state.live.first()].mode as usize;
+        }
+        self.weigh_modes(state);
+        let shares = state.probability.iter().enumerate();
+        let (likeliest, &most) = shares
+            .max_by(|a, b| a.1.total_cmp(b.1))
+            .unwrap_or((0, &0.0));
+        match most > libm::exp(self.settings.odds) * state.probability[state.mode] {
+            true => likeliest,
+            false => state.mode,
+        }
+    }
+
+    /// The probability of each mode.
+    pub(super) fn weigh_modes(&self, state: &mut BankState) {
+        let convinced = |slot: &usize| state.slots[*slot].convinced;
+        let scores = state.live.slots().filter(convinced);
+        let most = scores
+            .map(|slot| state.slots[slot].score)
+            .fold(f64::NEG_INFINITY, f64::max);
+        state.probability.fill(0.0);
+        let mut sum = 0.0;
+        for slot in state.live.slots() {
+            let h = &state.slots[slot];
+            if h.convinced {
+                let weight = libm::exp((h.score - most).min(0.0));
+                state.probability[h.mode as usize] += weight;
+                sum += weight;
+            }
+        }
+        for share in &mut state.probability {
+            *share /= sum;
+        }
+    }
+}
+
+/// Whether `h` differs from `leading` by nothing but the mode, which is `mode`.
+fn stands_for(h: &Hypothesis, leading: &Hypothesis, mode: u32) -> bool {
+    h.mode == mode && h.kinds() == leading.kinds() && h.loose == leading.loose && h.convinced
+}
+
+/// A slot of so many that is not in use.
+fn free(live: Live, slots: usize) -> Option<usize> {
+    (0..slots).find(|&slot| !live.contains(slot))
+}
