@@ -67,6 +67,7 @@ impl Dynamics {
 
 /// Signals added from outside, or in place of the scenario.
 #[derive(Clone, Copy, Debug)]
+#[non_exhaustive]
 pub struct External<'a> {
     /// Fault added to each sensor (p).
     pub fault: &'a [f64],
@@ -76,6 +77,30 @@ pub struct External<'a> {
     pub mode: Option<usize>,
     /// Whether the scenario's measurement noise is on.
     pub noise: bool,
+}
+
+impl<'a> External<'a> {
+    /// A fault (p) and a disturbance (s) beside the scenario's own, with its schedule and its noise.
+    pub fn new(fault: &'a [f64], disturbance: &'a [f64]) -> Self {
+        Self {
+            fault,
+            disturbance,
+            mode: None,
+            noise: true,
+        }
+    }
+
+    /// In this mode (0-based) in place of the scenario, where one is given.
+    #[must_use]
+    pub fn in_mode(self, mode: Option<usize>) -> Self {
+        Self { mode, ..self }
+    }
+
+    /// With the scenario's measurement noise, or without.
+    #[must_use]
+    pub fn with_noise(self, noise: bool) -> Self {
+        Self { noise, ..self }
+    }
 }
 
 /// The plant at one tick, with every signal an outside observer may see.
@@ -416,7 +441,7 @@ mod tests {
             let [x, y, y_true, fault, disturbance, reference, noise, last, next] = sizes.map(|size| vec![1.0; size]);
             let mut state = PlantState { tick: 3, mode, x, y, y_true, fault, waves: disturbance.clone(), disturbance, reference, played: None, noise, last, next, told: mode, drawn: None, departed: Departed::default() };
             let (u, f, w) = (vec![1.0; m], vec![1.0; p], vec![1.0; s]);
-            let external = External { fault: &f, disturbance: &w, mode: given, noise: true };
+            let external = External::new(&f, &w).in_mode(given);
             simulator.advance(&mut state, &u).unwrap();
             let mut trial = state.clone();
             let change = Change { command: &u, fault: &f, disturbance: &w };
