@@ -84,8 +84,8 @@ impl PlantSimulator {
             Some(told) => told.mode,
             None if deviation.mode_delay == 0 => mode,
             None => self
-                .scenario
-                .mode(tick.saturating_sub(deviation.mode_delay), te),
+                .schedule
+                .mode(tick.saturating_sub(deviation.mode_delay)),
         };
         told.min(self.plant.modes.len().saturating_sub(1))
     }
