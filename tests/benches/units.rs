@@ -10,13 +10,13 @@ use ftc_design::state_feedback::synthesise_with;
 use ftc_design::{DesignError, Run, StateFeedback, Step};
 use ftc_plant::scaling::Scaling;
 use plants::{in_units, random_plant, spread_units, usual_spec};
-use std::cell::Cell;
+use std::sync::atomic::{AtomicUsize, Ordering};
 
 fn main() {
-    let fallbacks = Cell::new(0);
+    let fallbacks = AtomicUsize::new(0);
     let count = |step: Step| {
         if step == Step::GeneralSolver {
-            fallbacks.set(fallbacks.get() + 1);
+            fallbacks.fetch_add(1, Ordering::Relaxed);
         }
     };
     let run = Run {
@@ -52,7 +52,7 @@ fn main() {
     println!(
         "| 200 | {designed} | {infeasible} | {} | {worst:.1e} | {} |",
         refused.len(),
-        fallbacks.get()
+        fallbacks.load(Ordering::Relaxed)
     );
     assert!(refused.is_empty(), "{refused:?}");
     assert!(worst < 1e-4, "gamma differs by {worst}");

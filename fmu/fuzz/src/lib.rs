@@ -1,3 +1,10 @@
 //! What the targets share.
 
+pub mod archive;
 pub mod design;
+
+// The program's own readers of archives, compiled here alone: the rest of its crate would take minutes.
+#[path = "../../../tools/package/src/description.rs"]
+mod description;
+#[path = "../../../tools/package/src/reading.rs"]
+mod reading;

@@ -4,6 +4,9 @@
 //! default). The solver links eight symbols of a BLAS and LAPACK: leave the feature `lapack` off in a
 //! program that links one, switch it on in a program that does not.
 //!
+//! Inside a thread pool of `rayon` (`pool.install(|| ...)`) parts that are independent, such as the modes under
+//! `dwell`, are worked on at the same time, with the same result to the bit.
+//!
 //! ```
 //! use ftc_design::{ControlSpec, state_feedback};
 //! use ftc_plant::{Mode, SwitchedPlant, scaling::Scaling};
@@ -49,6 +52,7 @@ pub mod lmi;
 mod lyapunov;
 mod matrices;
 pub mod observer;
+mod parallel;
 mod proof;
 mod record;
 mod request;

@@ -4,8 +4,8 @@
 //! feedback and of the observer together prove the loop. It is exponentially stable under every
 //! switching that both allow; where both ask for a dwell time, the larger one is enough.
 //!
-//! **Gains.** What the disturbance does to the performance signal, and what sensor noise and a fault
-//! that nobody noticed do to the true tracking error, are proved of the whole loop, mode by mode, and
+//! **Gains.** What the disturbance does to the performance signal, and what sensor noise and an
+//! undetected fault do to the true tracking error, are proved of the whole loop, mode by mode, and
 //! the first also under arbitrary switching where one Lyapunov function gives it within
 //! [`TOLERANCE`] of what a measured state would.
 
@@ -23,6 +23,7 @@ mod transfer_synthesis;
 use crate::blocks::{BlockKind, BlockName};
 use crate::certificate::{CertificateError, FactoredLyapunov, require};
 use crate::observer::{check_detectable, sets};
+use crate::parallel;
 use crate::riccati;
 use crate::{ObserverDesign, StateFeedback, Units};
 use ftc_control::Matrix;
@@ -45,7 +46,7 @@ pub const TOLERANCE: f64 = 0.05;
 #[non_exhaustive]
 pub struct RunningLoop {
     /// l2 gain from the disturbance to the performance signal while a mode lasts, per mode; none
-    /// where the plant knows no disturbance.
+    /// where the plant has no disturbance.
     pub gamma_loop: Option<Vec<f64>>,
     /// Root of the summed mean squares of the true tracking errors under independent white noise of
     /// deviation one on every sensor, per mode.
@@ -266,24 +267,23 @@ impl RunningLoop {
         let subject = Subject::new(plant, control, observer);
         let loops: Vec<Loop> = (0..subject.modes()).map(|i| subject.healthy(i)).collect();
         let levels = |loops: &[Loop], claim: Claim| -> Option<Vec<f64>> {
-            let of = |model| subject.scaled(model, &claim).level(&claim);
-            loops.iter().map(of).collect()
+            parallel::every(loops, |model| subject.scaled(model, &claim).level(&claim))
         };
         let disturbed = subject.disturbed();
-        let table = sets(plant.dimensions().outputs).into_iter().map(|sensors| {
-            let served = subject.without(&sensors);
+        let table = parallel::each(&sets(plant.dimensions().outputs), |sensors| {
+            let served = subject.without(sensors);
             LostSensors {
-                observable: subject.observable(&sensors),
+                observable: subject.observable(sensors),
                 stable: served.is_some(),
                 gamma_loop: served
                     .filter(|_| disturbed)
                     .and_then(|loops| levels(&loops, Claim::Disturbance)),
-                sensors,
+                sensors: sensors.clone(),
             }
         });
         Some(Self {
             transfer: None,
-            lost: table.collect(),
+            lost: table,
             gamma_loop: match disturbed {
                 true => Some(levels(&loops, Claim::Disturbance)?),
                 false => None,
@@ -323,9 +323,7 @@ impl RunningLoop {
         if let Some(switching) = &self.switching {
             prove_switching(&subject, switching)?;
         }
-        for entry in &self.lost {
-            verify_entry(&subject, entry)?;
-        }
+        parallel::all(&self.lost, |entry| verify_entry(&subject, entry))?;
         match &self.transfer {
             Some(certificate) => transfer::prove(&subject, certificate),
             None => Ok(()),

@@ -57,8 +57,8 @@ impl fmt::Display for Step {
 pub struct Run<'a> {
     /// The solver.
     pub solver: Solver,
-    /// Called at every step.
-    pub watch: &'a dyn Fn(Step),
+    /// Called at every step, from several threads where several are offered.
+    pub watch: &'a (dyn Fn(Step) + Sync),
 }
 
 impl Default for Run<'_> {

@@ -89,11 +89,16 @@ impl Work {
 
     /// The time in words.
     pub fn time(&self) -> String {
-        match self.seconds {
-            seconds if seconds < 90.0 => format!("{seconds:.0} s"),
-            seconds if seconds < 5400.0 => format!("{:.0} minutes", seconds / 60.0),
-            seconds => format!("{:.0} hours", seconds / 3600.0),
-        }
+        in_words(self.seconds)
+    }
+}
+
+/// A time in seconds, minutes or hours.
+pub fn in_words(seconds: f64) -> String {
+    match seconds {
+        seconds if seconds < 90.0 => format!("{seconds:.0} s"),
+        seconds if seconds < 5400.0 => format!("{:.0} minutes", seconds / 60.0),
+        seconds => format!("{:.0} hours", seconds / 3600.0),
     }
 }
 

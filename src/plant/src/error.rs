@@ -15,7 +15,7 @@ pub enum PlantError {
     Empty(&'static str),
     /// A matrix of the first mode does not fit its `A`.
     #[error(
-        "mode 1: {matrix} is {} x {}, but with A of {states} x {states} it has to be {}",
+        "mode 1: {matrix} is {} x {}, {}",
         found.0, found.1, fitting(matrix, *found, *needed, *states)
     )]
     Shape {
@@ -80,7 +80,7 @@ pub enum PlantError {
     },
 }
 
-/// The size that a matrix must have beside `A`, and whether it has it once transposed.
+/// What size a matrix must have beside `A`, and whether it has it once transposed.
 fn fitting(matrix: &str, found: (usize, usize), needed: (usize, usize), states: usize) -> String {
     // The other size of these matrices was taken from their own, so a transposed one tells it wrongly.
     let transposed = match matrix {
@@ -88,9 +88,11 @@ fn fitting(matrix: &str, found: (usize, usize), needed: (usize, usize), states: 
         "C" if found.0 == states => Some((found.1, states)),
         _ => None,
     };
+    let wanted = format!("but with A of {states} x {states} it has to be");
     match transposed {
-        Some((rows, columns)) => format!("{rows} x {columns}: it seems to be transposed"),
-        None => format!("{} x {}", needed.0, needed.1),
+        Some((rows, columns)) => format!("{wanted} {rows} x {columns}: it seems to be transposed"),
+        None if matrix == "A" => "but A has to be square, a row and a column for each state".into(),
+        None => format!("{wanted} {} x {}", needed.0, needed.1),
     }
 }
 
@@ -100,9 +102,11 @@ mod tests {
 
     #[test]
     fn a_transposed_matrix_is_told_from_one_of_a_wrong_size() {
-        assert!(fitting("B", (2, 3), (3, 3), 3).starts_with("3 x 2: it seems"));
-        assert!(fitting("C", (3, 2), (3, 3), 3).starts_with("2 x 3: it seems"));
-        assert_eq!(fitting("B", (2, 2), (3, 2), 3), "3 x 2");
-        assert_eq!(fitting("A", (2, 3), (2, 2), 2), "2 x 2");
+        let begin = "but with A of 3 x 3 it has to be";
+        let says = |found: String, words: &str| found.starts_with(&format!("{begin} {words}"));
+        assert!(says(fitting("B", (2, 3), (3, 3), 3), "3 x 2: it seems"));
+        assert!(says(fitting("C", (3, 2), (3, 3), 3), "2 x 3: it seems"));
+        assert_eq!(fitting("B", (2, 2), (3, 2), 3), format!("{begin} 3 x 2"));
+        assert!(fitting("A", (2, 3), (2, 2), 2).contains("square"));
     }
 }

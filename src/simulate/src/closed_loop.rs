@@ -1,6 +1,6 @@
 //! The closed loop, controller first and then plant: what two coupled FMUs compute.
 
-use super::metrics::{self, Merit};
+use super::metrics::{Merit, MeritSum};
 use super::plant::{External, PlantSimulator, PlantState};
 use ftc_control::{Compensate, Controller, ControllerState};
 use serde::Serialize;
@@ -38,7 +38,7 @@ impl Variant {
     }
 }
 
-/// Whatever closes the loop: sees the plant's outputs, gives a command.
+/// What closes the loop: from the plant's outputs to a command.
 pub trait Regulator {
     /// One tick.
     fn tick(&mut self, seen: &PlantState);
@@ -247,32 +247,110 @@ fn drive(
     delayed: bool,
     mut show: impl FnMut(&PlantState, &dyn Regulator),
 ) -> Option<u64> {
-    let mut state = plant.initial_state();
-    let mut acting = regulator.command().to_vec();
-    let silent_fault = vec![0.0; state.y.len()];
-    let silent_disturbance = vec![0.0; state.disturbance.len()];
-    let external = External {
-        fault: &silent_fault,
-        disturbance: &silent_disturbance,
-        mode: None,
-        noise: true,
-    };
-    let mut stalled = None;
+    let mut closed = Loop::new(plant, Box::new(regulator), delayed);
     for _ in 0..plant.scenario().steps {
-        plant.observe(&mut state, &external);
-        regulator.tick(&state);
-        show(&state, regulator);
-        if !delayed {
-            acting.copy_from_slice(regulator.command());
-        }
-        regulator.advance(&state, &acting);
-        let tick = state.tick;
-        if plant.advance(&mut state, &acting).is_err() {
-            stalled = stalled.or(Some(tick));
-        }
-        acting.copy_from_slice(regulator.command());
+        closed.tick();
+        show(&closed.state, &*closed.regulator);
+        closed.advance();
     }
-    stalled
+    closed.stalled
+}
+
+impl<R: Regulator + ?Sized> Regulator for &mut R {
+    fn tick(&mut self, seen: &PlantState) {
+        (**self).tick(seen);
+    }
+
+    fn advance(&mut self, seen: &PlantState, acting: &[f64]) {
+        (**self).advance(seen, acting);
+    }
+
+    fn command(&self) -> &[f64] {
+        (**self).command()
+    }
+
+    fn report(&self) -> Report<'_> {
+        (**self).report()
+    }
+}
+
+/// A loop that is closed sample by sample, so that several can be run side by side: [`tick`](Self::tick),
+/// [`record`](Self::record), [`advance`](Self::advance).
+pub struct Loop<'a> {
+    plant: &'a PlantSimulator,
+    regulator: Box<dyn Regulator + 'a>,
+    delayed: bool,
+    state: PlantState,
+    acting: Vec<f64>,
+    fault: Vec<f64>,
+    disturbance: Vec<f64>,
+    stalled: Option<u64>,
+}
+
+impl<'a> Loop<'a> {
+    /// A loop at rest; `delayed` commands act one tick later.
+    pub fn new(
+        plant: &'a PlantSimulator,
+        regulator: Box<dyn Regulator + 'a>,
+        delayed: bool,
+    ) -> Self {
+        let state = plant.initial_state();
+        Self {
+            plant,
+            delayed,
+            acting: regulator.command().to_vec(),
+            regulator,
+            fault: vec![0.0; state.y.len()],
+            disturbance: vec![0.0; state.disturbance.len()],
+            state,
+            stalled: None,
+        }
+    }
+
+    /// A loop at rest with the tolerant controller.
+    pub fn tolerant(
+        plant: &'a PlantSimulator,
+        controller: &'a Controller,
+        variant: Variant,
+    ) -> Self {
+        let tolerant = Tolerant {
+            controller,
+            state: controller.initial_state(plant.initial_state().mode),
+            variant,
+        };
+        let delayed = controller.parameters().feedback.latency > 0;
+        Self::new(plant, Box::new(tolerant), delayed)
+    }
+
+    /// Observes the plant and computes a command.
+    pub fn tick(&mut self) {
+        let external = External::new(&self.fault, &self.disturbance);
+        self.plant.observe(&mut self.state, &external);
+        self.regulator.tick(&self.state);
+    }
+
+    /// The sample, after its tick.
+    pub fn record(&self) -> Record {
+        record(&self.state, &*self.regulator)
+    }
+
+    /// Lets the command act until the next sample.
+    pub fn advance(&mut self) {
+        if !self.delayed {
+            self.acting.copy_from_slice(self.regulator.command());
+        }
+        self.regulator.advance(&self.state, &self.acting);
+        let tick = self.state.tick;
+        if self.plant.advance(&mut self.state, &self.acting).is_err() {
+            self.stalled = self.stalled.or(Some(tick));
+        }
+        self.acting.copy_from_slice(self.regulator.command());
+    }
+
+    /// The first tick, if any, that the plant's equations could not be integrated through.
+    pub fn stalled(&self) -> Option<u64> {
+        self.stalled
+    }
 }
 
 fn record(plant: &PlantState, regulator: &dyn Regulator) -> Record {
@@ -306,44 +384,82 @@ pub struct WrongModes {
     pub longest: u64,
 }
 
-impl Trajectory {
-    /// Whether the mode was found from the readings.
-    pub fn finds_the_mode(&self) -> bool {
-        let first = self.records.first();
-        first.is_some_and(|record| record.mode_hat.is_some())
+/// [`WrongModes`], gathered sample by sample.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct ModeWatch {
+    found: bool,
+    wrong: WrongModes,
+    row: u64,
+}
+
+impl ModeWatch {
+    /// Looks at a sample.
+    pub fn see(&mut self, record: &Record) {
+        self.found |= record.mode_hat.is_some();
+        let wrong = record.mode_hat.is_some_and(|mode| mode != record.mode);
+        self.row = if wrong { self.row + 1 } else { 0 };
+        self.wrong.samples += u64::from(wrong);
+        self.wrong.longest = self.wrong.longest.max(self.row);
     }
 
     /// How often another mode was found than the plant was in; none where the mode was told.
     pub fn wrong_modes(&self) -> Option<WrongModes> {
-        let mut found = WrongModes::default();
-        let mut row = 0;
-        for record in &self.records {
-            let wrong = record.mode_hat.is_some_and(|mode| mode != record.mode);
-            row = if wrong { row + 1 } else { 0 };
-            found.samples += u64::from(wrong);
-            found.longest = found.longest.max(row);
-        }
-        self.finds_the_mode().then_some(found)
+        self.found.then_some(self.wrong)
+    }
+}
+
+impl Trajectory {
+    /// How often another mode was found than the plant was in; none where the mode was told.
+    pub fn wrong_modes(&self) -> Option<WrongModes> {
+        let mut watch = ModeWatch::default();
+        self.records.iter().for_each(|record| watch.see(record));
+        watch.wrong_modes()
     }
 
     /// Figures of merit of each tracked output (rows of `tracked`, 0-based), as far as the plant could
     /// be integrated.
     pub fn merits(&self, tracked: &[usize]) -> Vec<Merits> {
-        tracked
-            .iter()
-            .enumerate()
-            .map(|(index, &row)| {
-                let sound = |record: &&Record| self.stalled.is_none_or(|end| record.tick <= end);
-                let column = |pick: &dyn Fn(&Record) -> f64| {
-                    let records = self.records.iter().take_while(sound);
-                    records.map(pick).collect::<Vec<f64>>()
-                };
-                let reference = column(&|r| r.reference[index]);
-                Merits {
-                    measured: metrics::merit(&column(&|r| r.y[row]), &reference),
-                    truth: metrics::merit(&column(&|r| r.y_true[row]), &reference),
-                }
-            })
-            .collect()
+        let mut sums = MeritSums::new(tracked);
+        let sound = |record: &&Record| self.stalled.is_none_or(|end| record.tick <= end);
+        for record in self.records.iter().take_while(sound) {
+            sums.add(record);
+        }
+        sums.merits()
+    }
+}
+
+/// The figures of merit of a run, gathered sample by sample.
+#[derive(Clone, Debug)]
+pub struct MeritSums {
+    tracked: Vec<usize>,
+    /// Per tracked output, measured and true.
+    sums: Vec<[MeritSum; 2]>,
+}
+
+impl MeritSums {
+    /// Nothing yet, of these outputs (0-based).
+    pub fn new(tracked: &[usize]) -> Self {
+        Self {
+            sums: vec![Default::default(); tracked.len()],
+            tracked: tracked.to_vec(),
+        }
+    }
+
+    /// Adds a sample.
+    pub fn add(&mut self, record: &Record) {
+        let outputs = self.tracked.iter().zip(&record.reference);
+        for ([measured, truth], (&row, &reference)) in self.sums.iter_mut().zip(outputs) {
+            measured.add(record.y[row], reference);
+            truth.add(record.y_true[row], reference);
+        }
+    }
+
+    /// The figures of each tracked output.
+    pub fn merits(&self) -> Vec<Merits> {
+        let of = |[measured, truth]: &[MeritSum; 2]| Merits {
+            measured: measured.merit(),
+            truth: truth.merit(),
+        };
+        self.sums.iter().map(of).collect()
     }
 }

@@ -1,7 +1,7 @@
 //! What a user should know of a run that went through: values; the program that shows them adds the words.
 
+use crate::Variant;
 use crate::closed_loop::Record;
-use crate::{Trajectory, Variant};
 use ftc_control::estimator::InputHistory;
 use ftc_control::parameters::{Estimator, EstimatorMethod};
 use ftc_design::Design;
@@ -84,17 +84,86 @@ pub enum RunWarning {
     },
 }
 
-/// All warnings of the runs of a design.
-pub fn of_runs(design: &Design, runs: &[Trajectory]) -> Vec<RunWarning> {
-    let ftc = runs.iter().find(|run| run.variant == Variant::Ftc);
-    let unjudged = ftc.into_iter().flat_map(|run| unjudged(design, run));
-    let stopped = runs.iter().filter_map(|run| stopped(design, run));
-    let diodes = runs.iter().filter_map(|run| diodes_conduct(design, run));
-    let saturated = ftc.into_iter().flat_map(|run| saturated(design, run));
+/// What a run's warnings rest on, gathered sample by sample.
+#[derive(Debug)]
+pub struct RunWatch<'a> {
+    design: &'a Design,
+    variant: Variant,
+    samples: usize,
+    /// Samples in which each input is at a limit.
+    saturated: Vec<usize>,
+    /// Samples in which the estimate of each sensor's fault stands at its largest size.
+    capped: Vec<usize>,
+    held: Held,
+    /// What lay outside the healthy database.
+    outside: OutsideDatabase<'a>,
+    diodes: Option<DiodesConduct>,
+}
+
+impl<'a> RunWatch<'a> {
+    /// Nothing seen yet.
+    pub fn new(design: &'a Design, variant: Variant) -> Self {
+        let diodes = match design.true_plant.clone().into_parts() {
+            (TruePlant::Rectifier(rectifier), _) => Some(rectifier.diode_voltage()),
+            _ => None,
+        };
+        Self {
+            design,
+            variant,
+            samples: 0,
+            saturated: vec![0; design.signals.inputs.len()],
+            capped: vec![0; design.controller.estimator.authority().len()],
+            held: Held::default(),
+            outside: OutsideDatabase::new(design),
+            diodes: diodes.map(DiodesConduct::new),
+        }
+    }
+
+    /// Looks at a sample.
+    pub fn see(&mut self, record: &Record) {
+        self.samples += 1;
+        if let Some(diodes) = &mut self.diodes {
+            diodes.see(record);
+        }
+        if self.variant != Variant::Ftc {
+            return;
+        }
+        let limits = self.design.signals.inputs.iter().zip(&record.u);
+        for (count, (limit, &u)) in self.saturated.iter_mut().zip(limits) {
+            *count += usize::from(Some(u) == limit.min || Some(u) == limit.max);
+        }
+        let sizes = self.design.controller.estimator.authority().iter();
+        for (count, (&size, fault)) in self.capped.iter_mut().zip(sizes.zip(&record.f_hat)) {
+            *count += usize::from(fault.abs() >= size);
+        }
+        self.held
+            .see(&self.design.controller.estimator, record.mode);
+        self.outside.see(record);
+    }
+
+    fn share(&self, count: usize) -> f64 {
+        count as f64 / self.samples.max(1) as f64
+    }
+}
+
+/// All warnings of the runs of a design; each with the first tick it could not be integrated through.
+pub fn of_runs(design: &Design, runs: &[(RunWatch<'_>, Option<u64>)]) -> Vec<RunWarning> {
+    let ftc = || {
+        runs.iter()
+            .map(|(run, _)| run)
+            .filter(|run| run.variant == Variant::Ftc)
+    };
+    let stopped = runs.iter().filter_map(|(run, stalled)| {
+        Some(RunWarning::Stopped {
+            variant: run.variant,
+            time: (*stalled)? as f64 * design.plant.sample_time,
+        })
+    });
+    let diodes = runs.iter().filter_map(|(run, _)| diodes_conduct(run));
     unstable(design)
-        .chain(unjudged)
-        .chain(saturated)
-        .chain(ftc.into_iter().flat_map(|run| capped(design, run)))
+        .chain(ftc().flat_map(unjudged))
+        .chain(ftc().flat_map(saturated))
+        .chain(ftc().flat_map(capped))
         .chain(noisy_commands(design))
         .chain(stopped)
         .chain(diodes)
@@ -109,38 +178,28 @@ fn unstable(design: &Design) -> impl Iterator<Item = RunWarning> {
 }
 
 /// Inputs that spend many samples of a run at a limit.
-fn saturated(design: &Design, run: &Trajectory) -> Vec<RunWarning> {
-    let samples = run.records.len().max(1) as f64;
-    let limits = design.signals.inputs.iter().enumerate();
-    let shares = limits.map(|(input, limit)| {
-        let at_limit = |record: &&Record| {
-            let u = Some(record.u[input]);
-            u == limit.min || u == limit.max
-        };
-        (
-            input,
-            run.records.iter().filter(at_limit).count() as f64 / samples,
-        )
-    });
+fn saturated(run: &RunWatch<'_>) -> Vec<RunWarning> {
+    let shares = run.saturated.iter().map(|&count| run.share(count));
     shares
+        .enumerate()
         .filter(|(_, share)| *share > SHARE_SATURATED)
         .map(|(input, share)| RunWarning::Saturated { input, share })
         .collect()
 }
 
 /// Sensors whose fault estimate stands at its largest size in many samples of a run.
-fn capped<'a>(design: &'a Design, run: &'a Trajectory) -> impl Iterator<Item = RunWarning> + 'a {
-    let samples = run.records.len().max(1) as f64;
-    let limits = design.controller.estimator.authority().iter().enumerate();
-    limits.filter_map(move |(sensor, &size)| {
-        let at_limit = |record: &&Record| record.f_hat[sensor].abs() >= size;
-        let share = run.records.iter().filter(at_limit).count() as f64 / samples;
-        (share > SHARE_CAPPED).then_some(RunWarning::Capped {
+fn capped(run: &RunWatch<'_>) -> Vec<RunWarning> {
+    let sizes = run.design.controller.estimator.authority().iter();
+    let sensors = run.capped.iter().zip(sizes).enumerate();
+    sensors
+        .map(|(sensor, (&count, &size))| (sensor, run.share(count), size))
+        .filter(|(_, share, _)| *share > SHARE_CAPPED)
+        .map(|(sensor, share, size)| RunWarning::Capped {
             sensor,
             share,
             size,
         })
-    })
+        .collect()
 }
 
 /// Commands that the noise of the sensors moves by a large part of their range (or nominal value).
@@ -163,12 +222,9 @@ fn noisy_commands(design: &Design) -> Vec<RunWarning> {
 }
 
 /// How much of a run the estimator could not judge, and why.
-fn unjudged(design: &Design, run: &Trajectory) -> Vec<RunWarning> {
-    let estimator = &design.controller.estimator;
-    let samples = run.records.len();
-    let share = |count: usize| count as f64 / samples.max(1) as f64;
-    let held = share(held(estimator, &run.records));
-    let outside = OutsideDatabase::of(design, run);
+fn unjudged(run: &RunWatch<'_>) -> Vec<RunWarning> {
+    let estimator = &run.design.controller.estimator;
+    let (held, outside) = (run.share(run.held.samples), run.share(run.outside.samples));
     let mut warnings = Vec::new();
     if estimator.method != EstimatorMethod::None && held > SHARE_UNJUDGED {
         warnings.push(RunWarning::Unjudged {
@@ -176,82 +232,110 @@ fn unjudged(design: &Design, run: &Trajectory) -> Vec<RunWarning> {
             response_length: estimator.response_length,
         });
     }
-    if share(outside.samples) > SHARE_OUTSIDE {
+    if outside > SHARE_OUTSIDE {
         warnings.push(RunWarning::OutsideTheDatabase {
-            share: share(outside.samples),
-            widening: outside.widening,
+            share: outside,
+            widening: run.outside.widening,
         });
     }
     warnings
 }
 
 /// Samples after the start or a switch in which the regressor does not hold one mode only.
-fn held(estimator: &Estimator, records: &[Record]) -> usize {
-    let visits = records.chunk_by(|one, next| one.mode == next.mode);
-    visits
-        .map(|visit| visit.len().min(estimator.response_length))
-        .sum()
+#[derive(Clone, Copy, Debug, Default)]
+struct Held {
+    samples: usize,
+    mode: Option<usize>,
+    /// Samples of the present visit.
+    visit: usize,
 }
 
-/// What of a run lay outside the healthy database.
-struct OutsideDatabase {
+impl Held {
+    fn see(&mut self, estimator: &Estimator, mode: usize) {
+        if self.mode != Some(mode) {
+            (self.mode, self.visit) = (Some(mode), 0);
+        }
+        self.visit += 1;
+        self.samples += usize::from(self.visit <= estimator.response_length);
+    }
+}
+
+/// What of a run lay outside the healthy database: its inputs are played once more.
+#[derive(Debug)]
+struct OutsideDatabase<'a> {
+    design: &'a Design,
+    /// The inputs so far and the last command; none before the first sample.
+    played: Option<(InputHistory, Vec<f64>)>,
     /// How many samples.
     samples: usize,
     /// The most by which it opened thresholds.
     widening: f64,
 }
 
-impl OutsideDatabase {
-    /// Plays the inputs of a run once more.
-    fn of(design: &Design, run: &Trajectory) -> Self {
-        let controller = &design.controller;
-        let (estimator, modes) = (&controller.estimator, &design.plant.modes);
-        let mut outside = Self {
+impl<'a> OutsideDatabase<'a> {
+    fn new(design: &'a Design) -> Self {
+        Self {
+            design,
+            played: None,
             samples: 0,
             widening: 1.0,
-        };
-        let Some(first) = run.records.first() else {
-            return outside;
-        };
-        let start = &modes[first.mode].operating_point.u;
-        let mut history = InputHistory::new(start, estimator.response_length);
-        let mut before = start;
-        for record in &run.records {
-            if let Some(predictor) = estimator.predictors.get(record.mode) {
-                history.regress(&modes[record.mode].operating_point.u);
-                let leverage = history.leverage(&predictor.factor);
-                outside.samples += usize::from(leverage > estimator.leverage_limit);
-                outside.widening = outside.widening.max((1.0 + leverage).sqrt());
-            }
-            let delayed = controller.feedback.latency > 0;
-            history.push(if delayed { before } else { &record.u });
-            before = &record.u;
         }
-        outside
+    }
+
+    fn see(&mut self, record: &Record) {
+        let controller = &self.design.controller;
+        let (estimator, modes) = (&controller.estimator, &self.design.plant.modes);
+        if estimator.predictors.is_empty() {
+            return;
+        }
+        let (history, before) = self.played.get_or_insert_with(|| {
+            let start = &modes[record.mode].operating_point.u;
+            let history = InputHistory::new(start, estimator.response_length);
+            (history, start.clone())
+        });
+        if let Some(predictor) = estimator.predictors.get(record.mode) {
+            history.regress(&modes[record.mode].operating_point.u);
+            let leverage = history.leverage(&predictor.factor);
+            self.samples += usize::from(leverage > estimator.leverage_limit);
+            self.widening = self.widening.max((1.0 + leverage).sqrt());
+        }
+        let delayed = controller.feedback.latency > 0;
+        history.push(if delayed { before } else { &record.u });
+        before.clone_from(&record.u);
     }
 }
 
-/// A run that ended in equations without a solution.
-fn stopped(design: &Design, run: &Trajectory) -> Option<RunWarning> {
-    Some(RunWarning::Stopped {
-        variant: run.variant,
-        time: run.stalled? as f64 * design.plant.sample_time,
-    })
+/// When a rectifier left the region in which it is the plant of the design.
+#[derive(Clone, Copy, Debug)]
+struct DiodesConduct {
+    voltage: f64,
+    first: Option<u64>,
+    samples: usize,
 }
 
-/// A rectifier that left the region in which it is the plant of the design.
-fn diodes_conduct(design: &Design, run: &Trajectory) -> Option<RunWarning> {
-    let (TruePlant::Rectifier(rectifier), _) = design.true_plant.clone().into_parts() else {
-        return None;
-    };
-    let voltage = rectifier.diode_voltage();
-    let below = |record: &&Record| record.x[2] < voltage;
-    let first = run.records.iter().find(below)?;
-    let count = run.records.iter().filter(below).count();
+impl DiodesConduct {
+    fn new(voltage: f64) -> Self {
+        Self {
+            voltage,
+            first: None,
+            samples: 0,
+        }
+    }
+
+    fn see(&mut self, record: &Record) {
+        if record.x[2] < self.voltage {
+            self.first = self.first.or(Some(record.tick));
+            self.samples += 1;
+        }
+    }
+}
+
+fn diodes_conduct(run: &RunWatch<'_>) -> Option<RunWarning> {
+    let diodes = run.diodes?;
     Some(RunWarning::DiodesConduct {
         variant: run.variant,
-        voltage,
-        time: first.tick as f64 * design.plant.sample_time,
-        share: count as f64 / run.records.len() as f64,
+        voltage: diodes.voltage,
+        time: diodes.first? as f64 * run.design.plant.sample_time,
+        share: run.share(diodes.samples),
     })
 }

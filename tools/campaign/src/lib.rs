@@ -63,19 +63,30 @@ impl Default for Options {
 #[non_exhaustive]
 pub enum OptionsError {
     /// [`Options::model_error`].
-    #[error("model error is {0}: give a fraction from 0 to 1")]
+    #[error("model_error is {0}: give a fraction from 0 to 1")]
     ModelError(f64),
     /// [`Options::model_error`] of a design whose plant is nonlinear.
     #[error(
-        "model error is {0}, but it changes matrices and the plant of this design is nonlinear: leave it out"
+        "model_error is {0}, but it changes matrices and the plant of this design is nonlinear: leave it out"
     )]
     NoMatrices(f64),
     /// [`Options::largest_fault`].
-    #[error("largest fault is {0}: give 1 to 1e6 thresholds")]
+    #[error("largest_fault is {0}: give 1 to 1e6 thresholds")]
     LargestFault(f64),
     /// [`Options::most_faults`].
-    #[error("most faults is {0}: give at most 16")]
+    #[error("most_faults is {0}: give at most 16")]
     MostFaults(u32),
+}
+
+impl OptionsError {
+    /// Name of the option.
+    pub fn option(&self) -> &'static str {
+        match self {
+            Self::ModelError(_) | Self::NoMatrices(_) => "model_error",
+            Self::LargestFault(_) => "largest_fault",
+            Self::MostFaults(_) => "most_faults",
+        }
+    }
 }
 
 impl Options {
@@ -166,9 +177,12 @@ pub fn run_watched<E>(
     let mut first = range.start;
     while first < range.end && !watch.stop.load(Ordering::Relaxed) {
         let last = range.end.min(first + BATCH);
-        let outcomes: Vec<Option<Outcome>> = (first..last)
+        // One by one: a thread that took many at once would be waited for at the end of the batch.
+        let outcomes: Vec<Option<Outcome>> = (0..(last - first) as usize)
             .into_par_iter()
-            .map(|run| {
+            .with_max_len(1)
+            .map(|at| {
+                let run = first + at as u64;
                 if watch.stop.load(Ordering::Relaxed) {
                     return None;
                 }

@@ -1,6 +1,7 @@
 //! `campaign`: thousands of seeded random runs, in threads, shards and sittings.
 
 use crate::failure::Failure;
+use crate::progress::Progress;
 use crate::{Made, check_output};
 use campaign::page::quantile;
 use campaign::rows::RowWriter;
@@ -90,7 +91,10 @@ impl Arguments {
     pub fn check(&self) -> Result<(), Failure> {
         check_output(&self.out)?;
         let checked = self.options().check();
-        checked.map_err(|error| Failure::Input(error.to_string()))
+        checked.map_err(|error| {
+            let option = error.option().replace('_', "-");
+            Failure::Input(format!("--{option}: {error}"))
+        })
     }
 
     fn options(&self) -> Options {
@@ -109,14 +113,20 @@ impl Arguments {
 }
 
 /// Does the campaign and returns what to print.
-pub fn run(made: Made, arguments: &Arguments, quiet: bool) -> Result<String, Failure> {
+pub fn run(
+    made: Made,
+    arguments: &Arguments,
+    progress: Progress,
+    quiet: bool,
+) -> Result<String, Failure> {
     if arguments.model_error.is_some() {
         let checked = arguments.options().check_model_error(&made.design);
         checked.map_err(|what| Failure::Input(format!("--model-error: {what}")))?;
     }
     if let Some(run) = arguments.replay {
-        return replay(made, arguments, run);
+        return replay(made, arguments, run, &progress);
     }
+    drop(progress);
     let design = &made.design;
     let range = arguments.range();
     let asked = match arguments.merge.is_empty() {
@@ -143,11 +153,16 @@ pub fn run(made: Made, arguments: &Arguments, quiet: bool) -> Result<String, Fai
 }
 
 /// A run of the campaign, sample by sample.
-fn replay(mut made: Made, arguments: &Arguments, run: u64) -> Result<String, Failure> {
+fn replay(
+    mut made: Made,
+    arguments: &Arguments,
+    run: u64,
+    progress: &Progress,
+) -> Result<String, Failure> {
     let drawn = campaign::draw(&made.design, &arguments.options(), run);
     made.design.scenario = drawn.scenario;
     made.design.true_plant = drawn.truth;
-    crate::simulate(made, &arguments.design, &arguments.out, false)
+    crate::simulate(made, &arguments.design, &arguments.out, false, progress)
 }
 
 /// Reads the results of shards and puts them together.
@@ -244,8 +259,8 @@ impl Rows {
             let replacement = Replacement::of(target)?;
             Ok((replacement.file()?, replacement))
         });
-        let (file, replacement) = made.map_err(|error| blame(target, error))?;
-        let writer = RowWriter::new(file).map_err(|error| blame(target, error))?;
+        let (file, replacement) = made.map_err(|error| blame(target, &error))?;
+        let writer = RowWriter::new(file).map_err(|error| unwritten(target, error))?;
         Ok(Self {
             writer,
             replacement,
@@ -255,25 +270,35 @@ impl Rows {
     fn write(&mut self, outcomes: &[campaign::Outcome]) -> Result<(), Failure> {
         self.writer
             .write(outcomes)
-            .map_err(|error| blame(self.replacement.target(), error))
+            .map_err(|error| unwritten(self.replacement.target(), error))
     }
 
     fn keep(self) -> Result<(), Failure> {
         let target = self.replacement.target().to_path_buf();
         self.writer
             .finish()
-            .map_err(|error| blame(&target, error))?;
+            .map_err(|error| unwritten(&target, error))?;
         self.replacement
             .keep()
-            .map_err(|error| blame(&target, error))
+            .map_err(|error| blame(&target, &error))
     }
 }
 
-fn blame(path: &Path, error: impl std::fmt::Display) -> Failure {
-    Failure::Input(format!(
-        "{}: cannot be written ({error}): name a directory you may write to",
-        path.display()
-    ))
+fn blame(path: &Path, error: &std::io::Error) -> Failure {
+    let what = package::output::unwritten(error, "directory");
+    Failure::Input(format!("{}: {what}", path.display()))
+}
+
+/// What the file system said, where the Parquet writer passes it on.
+fn unwritten(path: &Path, error: campaign::rows::Error) -> Failure {
+    let error = match error {
+        campaign::rows::Error::External(error) => match error.downcast::<std::io::Error>() {
+            Ok(error) => *error,
+            Err(error) => std::io::Error::other(error),
+        },
+        error => std::io::Error::other(error),
+    };
+    blame(path, &error)
 }
 
 /// A bar with the time that remains on a terminal, a line every ten seconds elsewhere; ends when dropped.

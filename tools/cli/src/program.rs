@@ -13,6 +13,8 @@
 
 mod as_printed;
 mod campaigns;
+mod estimate;
+pub mod examples;
 mod failure;
 mod identification;
 mod progress;
@@ -23,10 +25,12 @@ use design_file::Loaded;
 use failure::Failure;
 use ftc_design::assembly::Request;
 use ftc_design::warnings::LoggedMovement;
-use ftc_design::work::Work;
-use ftc_design::{Design, Lyapunov, Run, Solver, Step};
+use ftc_design::{Design, Run, Solver, Step};
+use ftc_simulate::Variant;
+use ftc_simulate::closed_loop::Record;
 use package::output::Staging;
 use progress::Progress;
+use report::simulate::{Samples, SimulateError, TableOfSamples};
 use report::{summary, warnings};
 use serde_json::json;
 use std::ffi::OsString;
@@ -49,6 +53,11 @@ struct Arguments {
     /// Which solver finds the gains; what it finds is certified either way.
     #[arg(long, global = true, value_enum, default_value_t = SolverChoice::Structured)]
     solver: SolverChoice,
+    /// Work on so many independent parts of a design at the same time, such as the modes under dwell and sets
+    /// of lost sensors. The design does not depend on it; memory grows with it.
+    #[arg(long, global = true, value_name = "N", default_value_t = 1,
+          value_parser = clap::value_parser!(u16).range(1..=1024))]
+    threads: u16,
 }
 
 const EXIT_CODES: &str = "\
@@ -170,6 +179,17 @@ enum Command {
     /// modes, the models share one state.
     #[command(after_help = EXIT_CODES)]
     Identify(identification::Asked),
+    /// Write an example to start from: a design file, or a Python script from physics to FMUs.
+    ///
+    /// Without a name the examples are listed.
+    #[command(after_help = EXIT_CODES)]
+    Example {
+        /// Which example.
+        name: Option<String>,
+        /// Directory to write to; made if it does not exist.
+        #[arg(long, value_name = "DIR", default_value = ".")]
+        out: PathBuf,
+    },
     /// Run the paper's experiments and write one page each, with the same numbers as JSON and CSV.
     ///
     /// paper: its example in every variant, what it says beside what is found, and its figures.
@@ -203,12 +223,8 @@ impl From<SolverChoice> for Solver {
     }
 }
 
-/// Seconds from which a design is said to take long before it begins.
-const LONG: f64 = 30.0;
-
-/// Bytes from which a simulation is said to need much memory before it begins.
-const LARGE: u64 = 1 << 30;
-const GIGABYTE: f64 = (1u64 << 30) as f64;
+/// Samples between two words about how far a simulation has come.
+const BETWEEN_WORDS: u64 = 10_000;
 
 /// Exit code: done.
 const DONE: u8 = 0;
@@ -266,6 +282,8 @@ fn run(
     let progress = Progress::new(arguments.quiet);
     let asked = |solved, save| How {
         solver: arguments.solver.into(),
+        threads: arguments.threads.into(),
+        played: None,
         solved,
         save,
     };
@@ -323,22 +341,17 @@ fn run(
             solved,
         } => {
             check_output(out)?;
-            let made = solve(design, &asked(solved.as_deref(), None), &progress)?;
-            let bytes = report::simulate::memory(&made.design, *baselines);
-            progress.tell(match bytes > LARGE {
-                true => format!(
-                    "simulating, about {:.1} GB of memory",
-                    bytes as f64 / GIGABYTE
-                ),
-                false => "simulating".into(),
-            });
-            simulate(made, design, out, *baselines)
+            let how = How {
+                played: Some(*baselines),
+                ..asked(solved.as_deref(), None)
+            };
+            let made = solve(design, &how, &progress)?;
+            simulate(made, design, out, *baselines, &progress)
         }
         Command::Campaign(campaign) => {
             campaign.check()?;
             let made = solve(campaign.design(), &asked(None, None), &progress)?;
-            drop(progress);
-            campaigns::run(made, campaign, arguments.quiet)
+            campaigns::run(made, campaign, progress, arguments.quiet)
         }
         Command::Identify(asked) => {
             let (folder, name) = asked.target();
@@ -347,6 +360,18 @@ fn run(
             let (text, found) = identification::identify(asked)?;
             write(&folder, &[(name.clone(), text.into_bytes())])?;
             Ok(format!("{found}wrote {}\n", folder.join(name).display()))
+        }
+        Command::Example { name: None, .. } => Ok(examples::list()),
+        Command::Example {
+            name: Some(name),
+            out,
+        } => {
+            let files = examples::files(name)?;
+            write(out, &files)?;
+            let paths = files
+                .iter()
+                .map(|(file, _)| format!("wrote {}\n", out.join(file).display()));
+            Ok(paths.collect())
         }
         Command::Reproduce { experiment, out } => {
             check_output(out)?;
@@ -436,15 +461,38 @@ fn beside_program() -> Result<PathBuf, Failure> {
 }
 
 /// Simulates a design and writes what was found.
-fn simulate(made: Made, file: &Path, out: &Path, baselines: bool) -> Result<String, Failure> {
-    let found = report::simulate::simulate(&made.design, made.warnings, baselines)
-        .map_err(|error| Failure::Input(format!("{}: {error}", file.display())))?;
+fn simulate(
+    made: Made,
+    file: &Path,
+    out: &Path,
+    baselines: bool,
+    progress: &Progress,
+) -> Result<String, Failure> {
     let staging = Staging::new(out).map_err(Failure::output_directory)?;
-    staging
-        .add_written(report::simulate::TABLE, |file| {
-            found.write_table(file).map_err(std::io::Error::other)
-        })
-        .and_then(|()| add(&staging, &found.files))
+    let mut outcome = None;
+    let written = staging.add_written(report::simulate::TABLE, |file| {
+        let mut samples = Shown {
+            table: TableOfSamples::new(file, made.design.plant.sample_time),
+            progress,
+            done: 0,
+            steps: made.design.scenario.steps,
+        };
+        progress.tell("simulating");
+        let found =
+            report::simulate::simulate(&made.design, made.warnings, baselines, &mut samples);
+        if let Err(SimulateError::Samples(error)) = found {
+            return Err(error);
+        }
+        outcome = Some(found);
+        samples.table.finish()
+    });
+    written.map_err(Failure::output_directory)?;
+    let found = match outcome {
+        Some(Ok(found)) => found,
+        Some(Err(error)) => return Err(Failure::Input(format!("{}: {error}", file.display()))),
+        None => return Err(Failure::Input("nothing was simulated".into())),
+    };
+    add(&staging, &found.files)
         .and_then(|()| staging.commit())
         .map_err(Failure::output_directory)?;
     let mut text = found.summary;
@@ -454,6 +502,28 @@ fn simulate(made: Made, file: &Path, out: &Path, baselines: bool) -> Result<Stri
         out.join("report.html").display()
     );
     Ok(text + &warnings::text(&found.warnings))
+}
+
+/// The table of samples, with a word from time to time.
+struct Shown<'a, W: Write> {
+    table: TableOfSamples<W>,
+    progress: &'a Progress,
+    done: u64,
+    steps: u64,
+}
+
+impl<W: Write> Samples for Shown<'_, W> {
+    fn take(&mut self, runs: &[(Variant, Record)]) -> std::io::Result<()> {
+        self.done += 1;
+        if self.done.is_multiple_of(BETWEEN_WORDS) {
+            let (done, steps) = (self.done, self.steps);
+            self.progress.tell(match done == steps {
+                true => "simulating plants that are not quite the model".into(),
+                false => format!("simulating, {} % of {steps} samples", 100 * done / steps),
+            });
+        }
+        self.table.take(runs)
+    }
 }
 
 /// Runs an experiment of the paper and writes its page.
@@ -510,6 +580,10 @@ struct Made {
 /// How a design comes about.
 struct How<'a> {
     solver: Solver,
+    /// How many independent parts are worked on at the same time.
+    threads: usize,
+    /// Whether its scenario is played sample by sample, and then whether with the baselines.
+    played: Option<bool>,
     /// A file that holds it already.
     solved: Option<&'a Path>,
     /// Where to keep it.
@@ -524,6 +598,7 @@ fn solve(path: &Path, how: &How, progress: &Progress) -> Result<Made, Failure> {
         notes,
         ..
     } = read(path, progress)?;
+    estimate::announce(path, &request, how, progress)?;
     let asked = request.control.clone();
     let logged = LoggedMovement::of(&request.estimator.database);
     let key = solved::key(&request, how.solver);
@@ -533,7 +608,7 @@ fn solve(path: &Path, how: &How, progress: &Progress) -> Result<Made, Failure> {
             solved::load(file, &key)?
         }
         None => {
-            let made = synthesised(request, how.solver, progress);
+            let made = in_threads(how.threads, || synthesised(request, how.solver, progress))?;
             made.map_err(|error| {
                 eprint!("{}", warnings::text(&notes));
                 Failure::new(path, asked, error)
@@ -548,26 +623,25 @@ fn solve(path: &Path, how: &How, progress: &Progress) -> Result<Made, Failure> {
     Ok(Made { design, warnings })
 }
 
+/// Does work that may use so many threads.
+fn in_threads<T: Send>(threads: usize, work: impl FnOnce() -> T + Send) -> Result<T, Failure> {
+    if threads == 1 {
+        return Ok(work());
+    }
+    let pool = rayon::ThreadPoolBuilder::new()
+        .num_threads(threads)
+        .build()
+        .map_err(|error| Failure::Input(format!("--threads: no threads ({error}): give fewer")))?;
+    Ok(pool.install(work))
+}
+
 /// Solves for a design and says how far it has come.
 fn synthesised(
     request: Request,
     solver: Solver,
     progress: &Progress,
 ) -> Result<Design, ftc_design::Failure> {
-    let work = Work::new(
-        request.plant.dimensions(),
-        request.plant.modes.len(),
-        &request.control,
-    );
-    // Long designs under dwell are made by Riccati equations and are sooner over.
-    let inequalities = request.control.lyapunov != Lyapunov::Dwell;
-    progress.tell(match inequalities && work.seconds > LONG {
-        true => format!(
-            "solving for gains and certifying them, about {}",
-            work.time()
-        ),
-        false => "solving for gains and certifying them".into(),
-    });
+    progress.tell("solving for gains and certifying them");
     let watch = |step: Step| match step {
         Step::Iteration { number, usual, .. } => progress.iterate(step, number, usual),
         Step::GeneralSolver => progress.tell(step.to_string()),

@@ -16,6 +16,7 @@ const LINE_EVERY: Duration = Duration::from_secs(10);
 pub struct Progress {
     bar: ProgressBar,
     lines: Option<Lines>,
+    quiet: bool,
     /// When the first iteration of the current problem began.
     begun: Mutex<Option<Instant>>,
 }
@@ -34,6 +35,7 @@ impl Progress {
         Self {
             bar,
             lines: (!quiet && !terminal).then(Lines::start),
+            quiet,
             begun: Mutex::new(None),
         }
     }
@@ -45,6 +47,13 @@ impl Progress {
             lines.set(&what);
         }
         self.bar.set_message(what);
+    }
+
+    /// Says something at once, to be read later too.
+    pub fn announce(&self, what: &str) {
+        if !self.quiet {
+            self.bar.suspend(|| eprintln!("note: {what}"));
+        }
     }
 
     /// Says how far iterations have come, with the time that the rest will take at this pace.

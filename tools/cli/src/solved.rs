@@ -52,7 +52,7 @@ pub fn save(path: &Path, key: String, design: &Design) -> Result<(), Failure> {
         replacement.file()?.write_all(&bytes)?;
         replacement.keep()
     });
-    written.map_err(|error| failed(format!("cannot be written ({error}): choose another file")))
+    written.map_err(|error| failed(package::output::unwritten(&error, "file")))
 }
 
 /// Reads a solved design that belongs to this key, and proves it again.

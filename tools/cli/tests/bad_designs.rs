@@ -252,7 +252,7 @@ fn the_plant() {
             "A not square",
             "A = [[0.6, 0.45], [-0.2, 0.3]]",
             "A = [[0.6, 0.45, 0.1], [-0.2, 0.3, 0.1]]",
-            &["mode 1: A is 2 x 3"],
+            &["mode 1: A is 2 x 3", "square"],
         ),
         (
             "A larger than B",

@@ -329,7 +329,56 @@ fn damaged_logs_are_refused_in_one_sentence() {
         .map(|row| [row[0], row[1], row[1], row[3], row[4]])
         .collect();
     let cases: Vec<Case> = vec![
-        ("empty file", String::new(), &["no column"]),
+        ("empty file", String::new(), &["is empty"]),
+        (
+            "a comment above the header",
+            format!("# logged in hall 3\n{text}"),
+            &["line 1 is a comment", "'# logged in hall 3'"],
+        ),
+        (
+            "no header",
+            text.replacen("t,u[1],u[2],a,b\n", "", 1),
+            &["line 1 holds numbers", "add a header"],
+        ),
+        (
+            "a line of units",
+            text.replacen("a,b\n", "a,b\ns,V,V,m,m\n", 1),
+            &["line 2 holds no number", "delete it"],
+        ),
+        (
+            "bars between columns",
+            text.replace(',', "|"),
+            &["has columns that neither"],
+        ),
+        (
+            "spaces between columns",
+            text.replace(',', " "),
+            &["has columns that neither"],
+        ),
+        (
+            "a web page",
+            "<!DOCTYPE html><html><body>404</body></html>".into(),
+            &["is a web page or XML"],
+        ),
+        (
+            "decimal commas between commas",
+            text.replace('.', ","),
+            &["cells, but the header has 5", "by semicolons"],
+        ),
+        (
+            "milliseconds",
+            text.lines()
+                .enumerate()
+                .map(|(at, row)| match (at, row.split_once(',')) {
+                    (1.., Some((time, rest))) => format!("{time}000,{rest}\n"),
+                    _ => format!("{row}\n"),
+                })
+                .collect(),
+            &[
+                "row 2 (line 3)",
+                "if its times are in ms, name the column t [ms]",
+            ],
+        ),
         (
             "a time that lost a row",
             without(50).replacen("t,", "Time [s],", 1),

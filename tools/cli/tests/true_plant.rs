@@ -5,7 +5,7 @@
 
 mod common;
 
-use common::{Bench, FILE};
+use common::{Bench, FILE, SOUND};
 use std::fs;
 
 const DESIGN: &str = r#"
@@ -337,6 +337,25 @@ fn a_campaign_combines_its_model_error_with_the_true_plant() {
     }
 }
 
+/// What is out of its range is named as it was given.
+#[test]
+fn an_option_out_of_range_is_named() {
+    let bench = Bench::new(SOUND);
+    for (option, value) in [
+        ("--model-error", "7"),
+        ("--largest-fault", "0.5"),
+        ("--most-faults", "99"),
+    ] {
+        let run = bench.run(&["campaign", FILE, "--out", "out", option, value]);
+        assert_eq!(run.code(), 2);
+        let said = run.stderr();
+        assert!(
+            said.starts_with(&format!("error: {option}: ")) && said.contains(value),
+            "{said}"
+        );
+    }
+}
+
 /// A nonlinear plant has no matrices that a model error could change.
 #[test]
 fn a_model_error_of_a_nonlinear_plant_is_refused() {
@@ -349,7 +368,7 @@ fn a_model_error_of_a_nonlinear_plant_is_refused() {
     assert_eq!(run.code(), 2, "{}", run.stdout());
     assert!(
         run.stderr()
-            .contains("--model-error: model error is 0.1, but it changes matrices")
+            .contains("--model-error: model_error is 0.1, but it changes matrices")
     );
     assert!(!bench.path("out").exists());
     let run = campaign(&[]);

@@ -8,9 +8,9 @@ use crate::platform::{PLATFORMS, Platform};
 use crate::signature::SigningKey;
 use crate::ssp::{self, Component, System};
 use ftc_design::{Design, Proof};
-use ftc_simulate::Trajectory;
 use model_description::xml::{self, Document};
 use model_description::{CONTROLLER, Interface, PLANT, VariableTable};
+use report::Digest;
 use report::connection::{self, Side};
 use report::documentation;
 use std::fs;
@@ -78,7 +78,7 @@ struct Exporter<'a> {
     certificate: Vec<u8>,
     interface: Interface,
     /// The experiment, for the documentation's figures.
-    runs: Vec<Trajectory>,
+    runs: Vec<Digest>,
     binaries: Vec<Binaries>,
     key: Option<SigningKey>,
 }

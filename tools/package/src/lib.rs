@@ -27,6 +27,7 @@
 mod archive;
 pub mod binary;
 pub mod certificate;
+mod description;
 mod error;
 mod export;
 pub mod output;

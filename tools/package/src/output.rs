@@ -244,10 +244,27 @@ fn flush(folder: &Path) -> io::Result<()> {
 }
 
 fn blame(out: &Path, error: &io::Error) -> Error {
-    fault(
-        out,
-        format!("cannot be written to ({error}): name a directory you may write to"),
-    )
+    fault(out, unwritten(error, "directory"))
+}
+
+/// Why a file or directory (`what`) could not be written, and what to do, as the rest of a sentence.
+pub fn unwritten(error: &io::Error, what: &str) -> String {
+    use io::ErrorKind as Kind;
+    match error.kind() {
+        Kind::StorageFull => format!(
+            "cannot be written, the disk is full ({error}): make room on it, or name a {what} on another disk"
+        ),
+        Kind::QuotaExceeded => format!(
+            "cannot be written, your share of the disk is used up ({error}): make room, or name a {what} on another disk"
+        ),
+        Kind::FileTooLarge => format!(
+            "cannot be written, a file would be larger than is allowed ({error}): raise that limit (ulimit -f), or ask for less"
+        ),
+        Kind::PermissionDenied | Kind::ReadOnlyFilesystem => {
+            format!("cannot be written to ({error}): name a {what} you may write to")
+        }
+        _ => format!("cannot be written to ({error}): name another {what}"),
+    }
 }
 
 fn fault(out: &Path, what: String) -> Error {
@@ -365,6 +382,21 @@ mod tests {
             assert_eq!(hidden.count(), 0, "round {round}");
         }
         assert!(last >= 0, "some sets were completed");
+    }
+
+    #[test]
+    fn a_full_disk_is_not_blamed_on_the_directory() {
+        let said = |kind| unwritten(&io::Error::from(kind), "directory");
+        let full = said(io::ErrorKind::StorageFull);
+        assert!(full.contains("the disk is full") && full.contains("make room"));
+        assert!(!full.contains("may write"), "{full}");
+        assert!(said(io::ErrorKind::QuotaExceeded).contains("your share of the disk"));
+        assert!(said(io::ErrorKind::PermissionDenied).contains("a directory you may write to"));
+        // A writer that fails halfway passes its error on, of its kind.
+        let root = TempDir::new().unwrap();
+        let staging = Staging::new(root.path()).unwrap();
+        let written = staging.add_written("a", |_| Err(io::ErrorKind::StorageFull.into()));
+        assert!(written.unwrap_err().what.contains("the disk is full"));
     }
 
     #[test]

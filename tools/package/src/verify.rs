@@ -3,14 +3,13 @@
 use crate::Error;
 use crate::binary::{Ran, Runner};
 use crate::certificate::{self, Certificate};
+use crate::description::guid;
 use crate::export::{HOST, KINDS, Kind, RESOURCE};
 use crate::platform::PLATFORMS;
 use crate::reading;
 use crate::signature::{self, Origin, VerifyingKey};
 use ftc_design::running_loop::TransferCertificate;
 use ftc_design::{Design, DwellTime, LostSensors, Lyapunov, Proof};
-use quick_xml::escape::unescape;
-use quick_xml::events::Event;
 use report::running_loop;
 use serde_json::{Value, json};
 use std::collections::BTreeMap;
@@ -94,25 +93,6 @@ fn is_known(path: &str) -> bool {
         "model.png",
     ];
     files.contains(&path) || folders.iter().any(|folder| path.starts_with(folder))
-}
-
-/// The guid at the root of a description: the first element's, whatever follows it.
-fn guid(description: &str) -> Result<Option<String>, String> {
-    let mut reader = quick_xml::Reader::from_str(description);
-    loop {
-        match reader.read_event().map_err(|error| error.to_string())? {
-            Event::Start(root) | Event::Empty(root) => {
-                // Without the check for attributes that stand twice, which takes the square of their number.
-                let mut attributes = root.attributes();
-                let mut attributes = attributes.with_checks(false).flatten();
-                let guid = attributes.find(|attribute| attribute.key.as_ref() == "guid");
-                return Ok(guid
-                    .map(|attribute| unescape(&attribute.value).unwrap_or_default().into_owned()));
-            }
-            Event::Eof => return Err("there is no element in it".into()),
-            _ => {}
-        }
-    }
 }
 
 /// An unpacked FMU.

@@ -12,6 +12,7 @@ from __future__ import annotations
 
 import json
 import sys
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ftc_fmu import _core
@@ -58,6 +59,32 @@ def platforms() -> list[str]:
     return _core.platforms(HOME)
 
 
+def examples() -> list[str]:
+    """Returns the names of the examples that this installation holds, for `example`."""
+    return _core.examples()
+
+
+def example(name: str, folder: str | PathLike[str] = ".") -> Path:
+    """Writes an example: a design file with its logs, or a Python script from physics to FMUs.
+
+    Args:
+        name: One of `examples()`.
+        folder: Where to; made where there is none. Files of the same names are replaced.
+
+    Returns:
+        The file to start from: give it to `load`, or run it.
+
+    Raises:
+        DesignFileError: There is no such example.
+    """
+    files = _core.example(name)
+    folder = Path(folder)
+    folder.mkdir(parents=True, exist_ok=True)
+    for file, contents in files:
+        (folder / file).write_bytes(contents)
+    return folder / files[0][0]
+
+
 __all__ = [
     "Campaign",
     "Controller",
@@ -77,6 +104,8 @@ __all__ = [
     "Unproved",
     "campaign",
     "design",
+    "example",
+    "examples",
     "load",
     "platforms",
     "verify",

@@ -156,7 +156,14 @@ class Design:
         return self.core.html()
 
 
-def design(plant: Plant, *, name: str = "design", progress: Progress = None, **keys: Any) -> Design:  # noqa: ANN401
+def design(
+    plant: Plant,
+    *,
+    name: str = "design",
+    progress: Progress = None,
+    threads: int = 1,
+    **keys: Any,  # noqa: ANN401
+) -> Design:
     """Designs, certifies and returns a controller for a plant.
 
     Args:
@@ -164,6 +171,8 @@ def design(plant: Plant, *, name: str = "design", progress: Progress = None, **k
         name: Names the FMUs: letters, digits, underscores.
         progress: `True` prints what is going on and for how long; a function is called with
             both, about once a second, and may raise to stop waiting.
+        threads: How many independent parts are worked on at the same time, such as the modes under
+            `lyapunov="dwell"`; the design does not depend on it.
         **keys: Keys of the design file, with the same names and defaults. Those of `[controller]`
             stand alone (`tracked`, `latency`, `lyapunov`, `decay`, `output_weight`, ...); the
             tables `disturbance`, `observer`, `estimator`, `compensation` and `scenario` are
@@ -189,15 +198,17 @@ def design(plant: Plant, *, name: str = "design", progress: Progress = None, **k
     if control:
         document["controller"] = plain(control, "controller")
     document |= {key: plain(dict(table), key) for key, table in tables.items() if table is not None}
-    return Design(_core.solve(to_toml(document), str(folder), None, listener(progress)), document, folder)
+    core = _core.solve(to_toml(document), str(folder), None, listener(progress), threads)
+    return Design(core, document, folder)
 
 
-def load(path: str | PathLike[str], *, progress: Progress = None) -> Design:
+def load(path: str | PathLike[str], *, progress: Progress = None, threads: int = 1) -> Design:
     """Reads a design file and makes its design.
 
     Args:
         path: Design file (TOML); logs and tables are sought beside it.
         progress: As in `design`.
+        threads: As in `design`.
 
     Raises:
         DesignFileError: The file is at fault: `key` and `line` say where.
@@ -206,7 +217,7 @@ def load(path: str | PathLike[str], *, progress: Progress = None) -> Design:
     """
     path = Path(path)
     text = _core.read_text(str(path))
-    core = _core.solve(text, str(path.parent), str(path), listener(progress))
+    core = _core.solve(text, str(path.parent), str(path), listener(progress), threads)
     return Design(core, tomllib.loads(text.removeprefix("\ufeff")), path.parent)
 
 

@@ -15,6 +15,9 @@ use report::{summary, warnings};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
+/// The most threads of one design.
+const MOST_THREADS: usize = 1024;
+
 /// A design and what its user should know of it.
 pub struct Made {
     /// The design.
@@ -36,27 +39,49 @@ pub fn read_text(py: Python<'_>, path: PathBuf) -> PyResult<String> {
 /// Designs what a text asks for; logs and tables are sought in `folder`. `called` is the name of
 /// the file that the user wrote, if there is one.
 #[pyfunction]
-#[pyo3(signature = (text, folder, called=None, listener=None))]
+#[pyo3(signature = (text, folder, called=None, listener=None, threads=1))]
 pub fn solve(
     py: Python<'_>,
     text: &str,
     folder: PathBuf,
     called: Option<&str>,
     listener: Option<Py<PyAny>>,
+    threads: usize,
 ) -> PyResult<Design> {
+    let pool = (threads != 1).then(|| pool(py, threads)).transpose()?;
     let author = called.map_or(Author::Package, Author::User);
     let loaded =
         design_file::parse(text, &folder).map_err(|error| errors::of_input(py, error, author))?;
     let what = || "solving for gains and certifying them".to_string();
     let made = wait(py, &what, listener.as_ref(), move || {
         let logged = LoggedMovement::of(&loaded.request.estimator.database);
-        let design = assemble(loaded.request)?;
+        let design = match pool {
+            Some(pool) => pool.install(|| assemble(loaded.request))?,
+            None => assemble(loaded.request)?,
+        };
         let mut warnings = loaded.notes;
         warnings.extend(warnings::of_design(&loaded.file, logged.as_ref(), &design));
         Ok::<_, DesignError>(Made { design, warnings })
     })?;
     made.map(|made| Design(Arc::new(made)))
         .map_err(|error| errors::of_design(py, &error, text, author))
+}
+
+fn pool(py: Python<'_>, threads: usize) -> PyResult<rayon::ThreadPool> {
+    let range = 1..=MOST_THREADS;
+    let built = match range.contains(&threads) {
+        true => rayon::ThreadPoolBuilder::new().num_threads(threads).build(),
+        false => {
+            let what = format!("threads is {threads}: give 1 to {MOST_THREADS}");
+            return Err(errors::of_sentence(py, what));
+        }
+    };
+    built.map_err(|error| {
+        errors::of_sentence(
+            py,
+            format!("threads: none can be started ({error}): give fewer"),
+        )
+    })
 }
 
 /// A design from its record.

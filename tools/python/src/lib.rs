@@ -13,6 +13,7 @@ mod run;
 mod waiting;
 
 use pyo3::prelude::*;
+use pyo3::types::PyBytes;
 use std::ffi::OsString;
 use std::path::{Path, PathBuf};
 
@@ -29,7 +30,7 @@ mod _core {
     #[pymodule_export]
     use super::run::Run;
     #[pymodule_export]
-    use super::{main, platforms, verify, version};
+    use super::{example, examples, main, platforms, verify, version};
 }
 
 /// The command line; returns its exit code.
@@ -73,6 +74,20 @@ fn platforms(binaries: PathBuf) -> Vec<&'static str> {
     all.filter(|platform| holds(platform))
         .map(|platform| platform.name)
         .collect()
+}
+
+/// Names of the examples.
+#[pyfunction]
+fn examples() -> Vec<&'static str> {
+    ftc_fmu::examples::names()
+}
+
+/// Name and contents of an example's files, the one to start from first.
+#[pyfunction]
+fn example(py: Python<'_>, name: &str) -> PyResult<Vec<(String, Py<PyBytes>)>> {
+    let files = ftc_fmu::examples::files(name).map_err(|what| errors::of_sentence(py, what))?;
+    let bytes = |(name, bytes): (String, Vec<u8>)| (name, PyBytes::new(py, &bytes).unbind());
+    Ok(files.into_iter().map(bytes).collect())
 }
 
 /// Version of the package.

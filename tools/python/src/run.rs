@@ -1,11 +1,11 @@
 //! One simulated experiment: trajectories, figures of merit, page.
 
 use ftc_design::Design;
-use ftc_simulate::Trajectory;
+use ftc_simulate::Variant;
 use ftc_simulate::closed_loop::Record;
 use pyo3::prelude::*;
 use pyo3::types::PyBytes;
-use report::simulate::{SimulateError, Simulation};
+use report::simulate::{Samples, SimulateError, Simulation};
 
 /// A signal of one sample.
 type Reading = fn(&Record) -> &[f64];
@@ -33,12 +33,95 @@ const OWN: [(&str, Reading); 7] = [
 #[pyclass(frozen, module = "ftc_fmu._core")]
 pub struct Run {
     simulation: Simulation,
-    sample_time: f64,
+    columns: Vec<Column>,
+    variants: Vec<&'static str>,
     tracked: Vec<usize>,
     outputs: Vec<String>,
 }
 
-/// Name, width (0: one number a sample) and little-endian doubles of a signal.
+/// A signal of all samples, one sample after the other.
+struct Column {
+    name: String,
+    /// 0: one number a sample.
+    width: usize,
+    values: Vec<f64>,
+}
+
+/// Keeps every signal as it comes.
+struct Columns {
+    sample_time: f64,
+    columns: Vec<Column>,
+    variants: Vec<&'static str>,
+}
+
+impl Columns {
+    /// The columns of these runs, empty.
+    fn begin(&mut self, runs: &[(Variant, Record)]) {
+        let Some((_, first)) = runs.first() else {
+            return;
+        };
+        let mut add = |name: String, width: usize| {
+            self.columns.push(Column {
+                name,
+                width,
+                values: Vec::new(),
+            });
+        };
+        add("t".into(), 0);
+        add("mode".into(), 0);
+        for (name, reading) in SHARED {
+            add(name.into(), reading(first).len());
+        }
+        for (variant, record) in runs {
+            let key = variant.key();
+            for (name, reading) in OWN {
+                add(format!("{key}.{name}"), reading(record).len());
+            }
+            add(format!("{key}.fault"), record.flagged.len());
+            if record.mode_hat.is_some() {
+                add(format!("{key}.mode_hat"), 0);
+            }
+        }
+        self.variants = runs.iter().map(|(variant, _)| variant.key()).collect();
+    }
+}
+
+impl Samples for Columns {
+    fn take(&mut self, runs: &[(Variant, Record)]) -> std::io::Result<()> {
+        if self.columns.is_empty() {
+            self.begin(runs);
+        }
+        let Some((_, first)) = runs.first() else {
+            return Ok(());
+        };
+        let time = [first.tick as f64 * self.sample_time];
+        let mode = [(first.mode + 1) as f64];
+        let mut columns = self.columns.iter_mut();
+        let mut put = |values: &[f64]| {
+            if let Some(column) = columns.next() {
+                column.values.extend_from_slice(values);
+            }
+        };
+        put(&time);
+        put(&mode);
+        for (_, reading) in SHARED {
+            put(reading(first));
+        }
+        for (_, record) in runs {
+            for (_, reading) in OWN {
+                put(reading(record));
+            }
+            let flags = record.flagged.iter().map(|&flag| f64::from(u8::from(flag)));
+            put(&flags.collect::<Vec<f64>>());
+            if let Some(mode) = record.mode_hat {
+                put(&[(mode + 1) as f64]);
+            }
+        }
+        Ok(())
+    }
+}
+
+/// Name, width (0: one number a sample) and native doubles of a signal.
 type Signal<'py> = (String, usize, Bound<'py, PyBytes>);
 
 impl Run {
@@ -51,9 +134,19 @@ impl Run {
         warnings: Vec<String>,
         baselines: bool,
     ) -> Result<Self, SimulateError> {
-        Ok(Self {
-            simulation: report::simulate::simulate(design, warnings, baselines)?,
+        let mut kept = Columns {
             sample_time: design.plant.sample_time,
+            columns: Vec::new(),
+            variants: Vec::new(),
+        };
+        let simulation = report::simulate::simulate(design, warnings, baselines, &mut kept)?;
+        // A scenario without disturbances has no column for them.
+        let shown = |column: &Column| column.width > 0 || !column.values.is_empty();
+        kept.columns.retain(shown);
+        Ok(Self {
+            simulation,
+            columns: kept.columns,
+            variants: kept.variants,
             tracked: design.controller.feedback.tracked.clone(),
             outputs: design
                 .signals
@@ -70,73 +163,23 @@ impl Run {
             String::from_utf8_lossy(bytes).into_owned()
         })
     }
-
-    fn signals_of<'py>(&self, py: Python<'py>, run: &Trajectory) -> Vec<Signal<'py>> {
-        let key = run.variant.key();
-        let mut signals: Vec<Signal<'py>> = OWN
-            .iter()
-            .map(|(name, reading)| table(py, format!("{key}.{name}"), run, *reading))
-            .collect();
-        let width = run.records.first().map_or(0, |record| record.flagged.len());
-        let flags = run.records.iter().flat_map(|record| &record.flagged);
-        let flags = doubles(py, flags.map(|&flag| f64::from(u8::from(flag))));
-        signals.push((format!("{key}.fault"), width, flags));
-        if run.finds_the_mode() {
-            let modes = run.records.iter().filter_map(|record| record.mode_hat);
-            let modes = doubles(py, modes.map(|mode| (mode + 1) as f64));
-            signals.push((format!("{key}.mode_hat"), 0, modes));
-        }
-        signals
-    }
-}
-
-fn doubles<'py>(py: Python<'py>, values: impl Iterator<Item = f64>) -> Bound<'py, PyBytes> {
-    PyBytes::new(py, &values.flat_map(f64::to_ne_bytes).collect::<Vec<u8>>())
-}
-
-fn table<'py>(py: Python<'py>, name: String, run: &Trajectory, reading: Reading) -> Signal<'py> {
-    let width = run
-        .records
-        .first()
-        .map_or(0, |record| reading(record).len());
-    let values = run
-        .records
-        .iter()
-        .flat_map(|record| reading(record).iter().copied());
-    (name, width, doubles(py, values))
 }
 
 #[pymethods]
 impl Run {
     /// Every signal.
     fn signals<'py>(&self, py: Python<'py>) -> Vec<Signal<'py>> {
-        let Some(first) = self.simulation.trajectories.first() else {
-            return Vec::new();
+        let signal = |column: &Column| {
+            let bytes = column.values.iter().copied().flat_map(f64::to_ne_bytes);
+            let bytes = PyBytes::new(py, &bytes.collect::<Vec<u8>>());
+            (column.name.clone(), column.width, bytes)
         };
-        let records = || first.records.iter();
-        let times = records().map(|record| record.tick as f64 * self.sample_time);
-        let modes = records().map(|record| (record.mode + 1) as f64);
-        let mut signals = vec![
-            ("t".into(), 0, doubles(py, times)),
-            ("mode".into(), 0, doubles(py, modes)),
-        ];
-        let shared = SHARED
-            .iter()
-            .map(|(name, reading)| table(py, (*name).into(), first, *reading));
-        signals.extend(shared.filter(|(_, width, _)| *width > 0));
-        for run in &self.simulation.trajectories {
-            signals.extend(self.signals_of(py, run));
-        }
-        signals
+        self.columns.iter().map(signal).collect()
     }
 
     /// Keys of the variants.
     fn variants(&self) -> Vec<&'static str> {
-        self.simulation
-            .trajectories
-            .iter()
-            .map(|run| run.variant.key())
-            .collect()
+        self.variants.clone()
     }
 
     /// `metrics.json`.

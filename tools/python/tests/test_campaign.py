@@ -91,5 +91,5 @@ def test_what_is_written(alone: ftc.Campaign, tmp_path: Path) -> None:
 
 def test_an_option_that_is_unknown_or_out_of_range(paper: ftc.Design) -> None:
     """Is refused before anything is run."""
-    with pytest.raises(ftc.DesignFileError, match="model error is 2"):
+    with pytest.raises(ftc.DesignFileError, match="model_error is 2"):
         ftc.campaign(paper, runs=10, model_error=2.0)

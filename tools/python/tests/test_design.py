@@ -24,6 +24,32 @@ if TYPE_CHECKING:
     from pathlib import Path
 
 
+def test_examples_come_with_the_package(tmp_path: Path) -> None:
+    """Every example is written whole; a design file loads, a script starts."""
+    assert {"paper", "logged", "quadruple_tank", "from_a_log"} <= set(ftc.examples())
+    for name in ftc.examples():
+        start = ftc.example(name, tmp_path / name)
+        assert start.exists()
+        assert start.stem == name
+    assert ftc.load(ftc.example("tank.toml", tmp_path / "again")).name == "tank"
+    script = tmp_path / "quadruple_tank" / "quadruple_tank.py"
+    told = subprocess.run([sys.executable, script, "--help"], capture_output=True, text=True, check=False)
+    assert "--out" in told.stdout, told.stderr
+    with pytest.raises(ftc.DesignFileError, match='no example "reactor": name one of paper'):
+        ftc.example("reactor", tmp_path)
+
+
+def test_threads_do_not_change_a_design(tmp_path: Path) -> None:
+    """Modes under `dwell` solved in three threads are those solved in one."""
+    path = ftc.example("paper", tmp_path)
+    text = path.read_text(encoding="utf-8")
+    path.write_text(text.replace('lyapunov = "common"', 'lyapunov = "dwell"'), encoding="utf-8")
+    assert "dwell" in path.read_text(encoding="utf-8")
+    assert ftc.load(path).record() == ftc.load(path, threads=3).record()
+    with pytest.raises(ftc.DesignFileError, match="threads is 0: give 1 to 1024"):
+        ftc.load(path, threads=0)
+
+
 def program(*arguments: object) -> subprocess.CompletedProcess:
     """Runs the command line that the package brings along."""
     command = [sys.executable, "-m", "ftc_fmu", *map(str, arguments)]

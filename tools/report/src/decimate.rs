@@ -46,6 +46,72 @@ pub fn runs(points: &[Point], columns: usize) -> Vec<Vec<Point>> {
     found
 }
 
+/// Points up to which a curve is kept whole while it grows.
+const KEPT_WHOLE: u64 = 20_000;
+/// Stretches that a longer one is divided into.
+const STRETCHES: u64 = 4_096;
+
+/// A curve that grows point by point. Where it will have more than [`KEPT_WHOLE`] points, of each of
+/// [`STRETCHES`] stretches only the ends, the smallest and the largest are kept.
+#[derive(Clone, Debug)]
+pub struct Thinned {
+    /// Points of a stretch; 1 where all are kept.
+    stretch: usize,
+    kept: Vec<Point>,
+    /// The present stretch.
+    present: Vec<Point>,
+}
+
+impl Thinned {
+    /// A curve that will have so many points.
+    pub fn new(points: u64) -> Self {
+        let stretch = match points > KEPT_WHOLE {
+            true => points.div_ceil(STRETCHES),
+            false => 1,
+        };
+        Self {
+            stretch: stretch as usize,
+            kept: Vec::new(),
+            present: Vec::new(),
+        }
+    }
+
+    /// Adds a point.
+    pub fn push(&mut self, point: Point) {
+        if self.stretch == 1 {
+            self.kept.push(point);
+            return;
+        }
+        self.present.push(point);
+        if self.present.len() == self.stretch {
+            self.kept.extend(outline(&self.present));
+            self.present.clear();
+        }
+    }
+
+    /// The curve so far.
+    pub fn points(&self) -> Vec<Point> {
+        let mut points = self.kept.clone();
+        points.extend(outline(&self.present));
+        points
+    }
+}
+
+/// Both ends of a stretch (a gap there remains a gap), its smallest and its largest finite point.
+fn outline(stretch: &[Point]) -> impl Iterator<Item = Point> {
+    let by_value = |a: &usize, b: &usize| stretch[*a][1].total_cmp(&stretch[*b][1]);
+    let finite = || (0..stretch.len()).filter(|&at| is_finite(&stretch[at]));
+    let ends = (!stretch.is_empty()).then(|| [0, stretch.len() - 1]);
+    let inner = finite()
+        .min_by(by_value)
+        .into_iter()
+        .chain(finite().max_by(by_value));
+    let mut kept: Vec<usize> = ends.into_iter().flatten().chain(inner).collect();
+    kept.sort_unstable();
+    kept.dedup();
+    kept.into_iter().map(|at| stretch[at])
+}
+
 fn is_finite(point: &Point) -> bool {
     point.iter().all(|value| value.is_finite())
 }
@@ -137,6 +203,32 @@ mod tests {
                 }
             }
         }
+    }
+
+    #[test]
+    fn a_curve_thinned_while_it_grows_looks_the_same() {
+        let value = |k: u64| match k {
+            300_000..320_000 => f64::NAN,
+            412_345 => 7.0,
+            999_999 => -9.0,
+            k => (k as f64 * 1e-4).sin(),
+        };
+        let points: Vec<Point> = (0..1_000_000).map(|k| [k as f64, value(k)]).collect();
+        let mut thinned = Thinned::new(1_000_000);
+        points.iter().for_each(|&point| thinned.push(point));
+        let kept = thinned.points();
+        assert!(kept.len() <= 4 * (STRETCHES as usize + 1), "{}", kept.len());
+        let (found, wanted) = (runs(&kept, 500), runs(&points, 500));
+        assert_eq!(found.len(), wanted.len());
+        for (found, wanted) in found.iter().zip(&wanted) {
+            assert_eq!(
+                (range(found.iter().copied()), found.first(), found.last()),
+                (range(wanted.iter().copied()), wanted.first(), wanted.last())
+            );
+        }
+        let mut short = Thinned::new(20_000);
+        points[..20_000].iter().for_each(|&point| short.push(point));
+        assert_eq!(short.points(), points[..20_000]);
     }
 
     #[test]

@@ -1,18 +1,17 @@
 //! The page inside an FMU, `documentation/index.html`: the design's experiment in figures, and the
 //! design report.
 
-use crate::Scene;
 use crate::connection::{self, Side};
 use crate::page::{Block, Page, Section};
-use crate::{simulate, summary};
+use crate::{Digest, Scene, simulate, summary};
 use ftc_design::Design;
-use ftc_simulate::{Trajectory, Variant};
+use ftc_simulate::Variant;
 
 /// The most samples that are simulated for the figures; an export is to remain quick.
 const MOST_SAMPLES: u64 = 20_000;
 
 /// The runs that the figures show: with and without fault tolerance.
-pub fn runs(design: &Design) -> Vec<Trajectory> {
+pub fn runs(design: &Design) -> Vec<Digest> {
     let mut shown = design.clone();
     shown.scenario.steps = shown.scenario.steps.min(MOST_SAMPLES);
     let shows = [Variant::Ftc, Variant::NoFtc];
@@ -22,7 +21,7 @@ pub fn runs(design: &Design) -> Vec<Trajectory> {
 /// The page of one of the two FMUs, of which `title` and `lead` speak; without a side, of the design.
 pub fn page(
     design: &Design,
-    runs: &[Trajectory],
+    runs: &[Digest],
     side: Option<Side>,
     title: String,
     lead: String,

@@ -27,7 +27,7 @@ pub mod table;
 pub mod text;
 pub mod warnings;
 
-pub use demo::{Scene, events, files, page};
+pub use demo::{Digest, Scene, events, files, page};
 
 #[cfg(test)]
 mod tests;

@@ -5,7 +5,7 @@ use crate::text::significant;
 use ftc_control::Controller;
 use ftc_design::Design;
 use ftc_plant::deviation::{Load, Port};
-use ftc_plant::{Deviation, TruePlant};
+use ftc_plant::{Deviation, Dimensions, TruePlant};
 use ftc_simulate::closed_loop::visit;
 use ftc_simulate::{PlantSimulator, Variant};
 use serde_json::{Value, json};
@@ -51,6 +51,11 @@ pub fn cases(design: &Design) -> Vec<Case> {
             }
         })
         .collect()
+}
+
+/// How many cases [`cases`] tries for a plant of these sizes.
+pub(crate) fn count(size: Dimensions) -> usize {
+    4 + size.inputs + size.disturbances
 }
 
 /// What is tried, on top of what departs anyway.

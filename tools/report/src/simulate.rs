@@ -1,61 +1,86 @@
-//! Every variant of the loop, simulated natively and written down sample by sample.
+//! Every variant of the loop, simulated natively side by side and written down sample by sample.
 
 use crate::robustness;
 use crate::table::{Table, number};
-use crate::warnings;
+use crate::{Digest, warnings};
 use ftc_control::Controller;
 use ftc_design::Design;
-use ftc_simulate::baselines::comparison::{self, BaselineError};
-use ftc_simulate::closed_loop::{Merits, Record};
-use ftc_simulate::{PlantSimulator, Trajectory, Variant, run};
+use ftc_plant::Dimensions;
+use ftc_simulate::baselines::comparison::{BaselineError, Baselines, Bound};
+use ftc_simulate::closed_loop::{Loop, Merits, Record};
+use ftc_simulate::warnings::RunWatch;
+use ftc_simulate::{PlantSimulator, Variant, run};
 use serde_json::{Map, Value, json};
 use std::fmt::Write as _;
-use std::io::Write;
+use std::io::{self, Write};
 
-/// Everything that `simulate` writes, and what it says.
+/// Everything that `simulate` writes beside the samples, and what it says.
 pub struct Simulation {
-    /// Name and contents of every file but the table of [`write_table`](Self::write_table).
+    /// Name and contents of every file.
     pub files: Vec<(String, Vec<u8>)>,
     /// The figures of merit as a table for a person.
     pub summary: String,
     /// What its user should know of the design and of the runs.
     pub warnings: Vec<String>,
-    /// Every variant and baseline, sample by sample.
-    pub trajectories: Vec<Trajectory>,
-    /// `Te` in seconds.
-    pub sample_time: f64,
 }
 
-/// The file of [`Simulation::write_table`].
+/// Where samples go as they are made; none is kept otherwise.
+pub trait Samples {
+    /// Takes one sample of every run; the order of the runs is always the same.
+    ///
+    /// # Errors
+    /// What keeps it from being taken; the simulation ends then.
+    fn take(&mut self, runs: &[(Variant, Record)]) -> io::Result<()>;
+}
+
+/// Name of the table of all samples, see [`TableOfSamples`].
 pub const TABLE: &str = "trajectories.csv";
 
-/// A run that keeps more bytes than this one is refused.
-const MOST_BYTES: u64 = 8 << 30;
-/// Bytes of a list, apart from its numbers: where it is and how long, and what an allocation costs.
-const LIST: u64 = 48;
+/// A table that takes more bytes than this is refused.
+const MOST_BYTES: u64 = 64 << 30;
+/// Bytes of a number in the table, with its comma.
+const NUMBER: u64 = 20;
 
-/// About how many bytes the samples of `simulate` take: all of them are kept for figures and page.
-pub fn memory(design: &Design, baselines: bool) -> u64 {
-    let size = design.plant.dimensions();
-    let tracked = design.controller.feedback.tracked.len();
-    let numbers = tracked + size.disturbances + 6 * size.outputs + 2 * size.states + size.inputs;
-    let (lists, runs) = (12, if baselines { 5 } else { 3 });
-    let sample = size_of::<u64>() as u64 * (2 + numbers as u64) + lists * LIST;
-    sample * runs * design.scenario.steps
+/// What a simulation takes, known before anything is designed.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
+pub struct Extent {
+    /// Samples of each run.
+    pub steps: u64,
+    /// Runs in which the scenario is played once, plants that depart from the model among them.
+    pub runs: u64,
+    /// About how many bytes the table of all samples takes on the disk.
+    pub bytes: u64,
 }
 
-/// Refuses a run that would keep more than a usual machine has.
-fn check_memory(design: &Design, baselines: bool) -> Result<(), SimulateError> {
-    let (bytes, steps) = (memory(design, baselines), design.scenario.steps);
-    if bytes <= MOST_BYTES {
-        return Ok(());
+impl Extent {
+    /// Of a scenario for a plant of these sizes with so many tracked outputs.
+    pub fn new(size: Dimensions, tracked: usize, steps: u64, baselines: bool) -> Self {
+        let shared = 2 + tracked + size.disturbances + 2 * size.outputs;
+        let own = 5 * size.outputs + 2 * size.states + size.inputs;
+        let kept = if baselines { 5 } else { 3 };
+        Self {
+            steps,
+            runs: kept + 2 * robustness::count(size) as u64,
+            bytes: steps * NUMBER * (shared as u64 + kept * own as u64),
+        }
     }
-    let share = MOST_BYTES as f64 / bytes as f64;
-    Err(SimulateError::TooLong {
-        steps,
-        gigabytes: bytes >> 30,
-        most: (share * steps as f64) as u64,
-    })
+
+    /// Refuses what would fill a usual disk.
+    ///
+    /// # Errors
+    /// The estimate, and what would fit.
+    pub fn check(&self) -> Result<(), SimulateError> {
+        if self.bytes <= MOST_BYTES {
+            return Ok(());
+        }
+        let share = MOST_BYTES as f64 / self.bytes as f64;
+        Err(SimulateError::TooLong {
+            steps: self.steps,
+            gigabytes: self.bytes >> 30,
+            most: (share * self.steps as f64) as u64,
+        })
+    }
 }
 
 /// Why a simulation leaves no files.
@@ -65,9 +90,9 @@ pub enum SimulateError {
     /// There is no such baseline for this design.
     #[error(transparent)]
     Baseline(#[from] BaselineError),
-    /// The samples would take more memory than a usual machine has.
+    /// The samples would fill a usual disk.
     #[error(
-        "scenario.steps is {steps}: simulate keeps every sample, which would take about {gigabytes} GB of memory: give at most {most}"
+        "scenario.steps is {steps}: {TABLE} would take about {gigabytes} GB on the disk: give at most {most}"
     )]
     TooLong {
         /// Samples asked for.
@@ -77,27 +102,34 @@ pub enum SimulateError {
         /// Samples that would fit.
         most: u64,
     },
+    /// The samples could not be taken where they went.
+    #[error("the samples cannot be written ({0})")]
+    Samples(#[from] io::Error),
 }
 
 /// Runs the scenario in every variant, and with every baseline if asked for:
-/// `metrics.json`, `robustness.json` and the report. `warnings` are those of the design.
+/// `metrics.json`, `robustness.json` and the report. `warnings` are those of the design. Memory does not
+/// grow with the length of the scenario beyond a point: what the page shows is thinned as it comes.
 ///
 /// # Errors
-/// A baseline that cannot be made for this design, or a scenario too long to be kept.
+/// A baseline that cannot be made for this design, a scenario too long to be written, or samples that
+/// are not taken.
 pub fn simulate(
     design: &Design,
     mut warnings: Vec<String>,
     baselines: bool,
+    samples: &mut dyn Samples,
 ) -> Result<Simulation, SimulateError> {
-    check_memory(design, baselines)?;
-    let mut trajectories = trajectories(design);
-    let mut bound = None;
-    if baselines {
-        trajectories.extend(comparison::trajectories(design, &plant(design))?);
-        bound = Some(comparison::bound(design, &trajectories[0]));
-    }
-    warnings.extend(warnings::of_runs(design, &trajectories));
-    let metrics = metrics(design, &trajectories, bound.as_deref(), &warnings);
+    let feedback = &design.controller.feedback;
+    let (size, steps) = (design.plant.dimensions(), design.scenario.steps);
+    Extent::new(size, feedback.tracked.len(), steps, baselines).check()?;
+    let Gathered {
+        digests,
+        watches,
+        bound,
+    } = gather(design, baselines, samples)?;
+    warnings.extend(warnings::of_runs(design, &watches));
+    let metrics = metrics(&digests, bound.as_deref(), &warnings);
     let cases = robustness::cases(design);
     let worse = robustness::warnings(design, &cases);
     let tried = format!("{:#}\n", robustness::json(&cases, &worse));
@@ -107,55 +139,146 @@ pub fn simulate(
         ("robustness.json".to_string(), tried.into_bytes()),
     ];
     let section = robustness::section(design, &cases);
-    let page = crate::files(design, &trajectories, &warnings, section);
+    let page = crate::files(design, &digests, &warnings, section);
     files.extend(
         page.into_iter()
             .map(|(name, text)| (name, text.into_bytes())),
     );
     Ok(Simulation {
         files,
-        summary: summary(design, &trajectories, bound.as_deref())
-            + &robustness::text(design, &cases),
+        summary: summary(design, &digests, bound.as_deref()) + &robustness::text(design, &cases),
         warnings,
-        trajectories,
-        sample_time: design.plant.sample_time,
     })
 }
 
-impl Simulation {
-    /// Writes `trajectories.csv`, one row per sample: `t`, `mode` and the signals of the scenario, then
-    /// those of each variant.
+/// What is kept of all runs.
+struct Gathered<'a> {
+    digests: Vec<Digest>,
+    /// Each with the first tick that it could not be integrated through.
+    watches: Vec<(RunWatch<'a>, Option<u64>)>,
+    bound: Option<Vec<f64>>,
+}
+
+/// Runs all loops side by side.
+fn gather<'a>(
+    design: &'a Design,
+    baselines: bool,
+    samples: &mut dyn Samples,
+) -> Result<Gathered<'a>, SimulateError> {
+    let plant = plant(design);
+    let controller = controller(design);
+    let mut compared = match baselines {
+        true => Some(Baselines::new(design, &plant)?),
+        false => None,
+    };
+    let mut bound = compared.as_ref().map(|_| Bound::new(design));
+    let tolerant = |variant| (variant, Loop::tolerant(&plant, &controller, variant));
+    let mut loops: Vec<(Variant, Loop<'_>)> = Variant::ALL.map(tolerant).into();
+    if let Some(compared) = &mut compared {
+        loops.extend(compared.loops(&plant));
+    }
+    let mut digests: Vec<Digest> = loops
+        .iter()
+        .map(|(variant, _)| Digest::new(design, *variant))
+        .collect();
+    let mut watches: Vec<RunWatch<'a>> = loops
+        .iter()
+        .map(|(variant, _)| RunWatch::new(design, *variant))
+        .collect();
+    let mut sample = Vec::with_capacity(loops.len());
+    for _ in 0..design.scenario.steps {
+        sample.clear();
+        for (at, (variant, closed)) in loops.iter_mut().enumerate() {
+            closed.tick();
+            let record = closed.record();
+            digests[at].see(&record, closed.stalled().is_none());
+            watches[at].see(&record);
+            sample.push((*variant, record));
+        }
+        if let (Some(bound), Some((_, first))) = (&mut bound, sample.first()) {
+            bound.see(first);
+        }
+        samples.take(&sample)?;
+        for (_, closed) in &mut loops {
+            closed.advance();
+        }
+    }
+    let stalled = loops.iter().map(|(_, closed)| closed.stalled());
+    Ok(Gathered {
+        digests,
+        watches: watches.into_iter().zip(stalled).collect(),
+        bound: bound.map(|bound| bound.bounds()),
+    })
+}
+
+/// `trajectories.csv`, one row per sample: `t`, `mode` and the signals of the scenario, then those of
+/// each variant.
+pub struct TableOfSamples<W: Write> {
+    sample_time: f64,
+    sink: Option<W>,
+    table: Option<Table<W>>,
+    row: Vec<String>,
+}
+
+impl<W: Write> TableOfSamples<W> {
+    /// A table that goes where it is told as it grows; `sample_time` in seconds.
+    pub fn new(sink: W, sample_time: f64) -> Self {
+        Self {
+            sample_time,
+            sink: Some(sink),
+            table: None,
+            row: Vec::new(),
+        }
+    }
+
+    /// Writes what has not been written yet.
     ///
     /// # Errors
     /// What the sink says.
-    pub fn write_table(&self, sink: impl Write) -> csv::Result<()> {
-        let trajectories = &self.trajectories;
-        let records = trajectories.first().map_or(&[][..], |run| &run.records);
-        let Some(first) = records.first() else {
+    pub fn finish(self) -> io::Result<()> {
+        match self.table {
+            Some(table) => table.finish().map(drop).map_err(unwritten),
+            None => Ok(()),
+        }
+    }
+}
+
+/// What the sink said, of its kind.
+fn unwritten(error: csv::Error) -> io::Error {
+    match error.into_kind() {
+        csv::ErrorKind::Io(error) => error,
+        kind => io::Error::other(format!("{kind:?}")),
+    }
+}
+
+impl<W: Write> Samples for TableOfSamples<W> {
+    fn take(&mut self, runs: &[(Variant, Record)]) -> io::Result<()> {
+        let Some((_, first)) = runs.first() else {
             return Ok(());
         };
-        let mut table = Table::into_sink(sink, header(first, trajectories))?;
-        let mut row = Vec::new();
-        for (at, record) in records.iter().enumerate() {
-            row.clear();
-            let time = record.tick as f64 * self.sample_time;
-            row.push(number(time));
-            row.push((record.mode + 1).to_string());
-            for (_, values) in shared(record) {
+        if let Some(sink) = self.sink.take() {
+            let table = Table::into_sink(sink, header(first, runs)).map_err(unwritten)?;
+            self.table = Some(table);
+        }
+        let row = &mut self.row;
+        row.clear();
+        row.push(number(first.tick as f64 * self.sample_time));
+        row.push((first.mode + 1).to_string());
+        for (_, values) in shared(first) {
+            row.extend(values.iter().map(|&value| number(value)));
+        }
+        for (_, record) in runs {
+            for (_, values) in own(record) {
                 row.extend(values.iter().map(|&value| number(value)));
             }
-            for trajectory in trajectories {
-                let record = &trajectory.records[at];
-                for (_, values) in own(record) {
-                    row.extend(values.iter().map(|&value| number(value)));
-                }
-                let flags = record.flagged.iter();
-                row.extend(flags.map(|&flag| u8::from(flag).to_string()));
-                row.extend(record.mode_hat.map(|mode| (mode + 1).to_string()));
-            }
-            table.row(&row)?;
+            let flags = record.flagged.iter();
+            row.extend(flags.map(|&flag| u8::from(flag).to_string()));
+            row.extend(record.mode_hat.map(|mode| (mode + 1).to_string()));
         }
-        table.finish().map(drop)
+        match &mut self.table {
+            Some(table) => table.row(&*row).map_err(unwritten),
+            None => Ok(()),
+        }
     }
 }
 
@@ -167,19 +290,14 @@ fn plant(design: &Design) -> PlantSimulator {
     )
 }
 
-/// Every variant of the design's scenario.
-pub fn trajectories(design: &Design) -> Vec<Trajectory> {
-    Variant::ALL
-        .iter()
-        .map(|&variant| one(design, variant))
-        .collect()
+fn controller(design: &Design) -> Controller {
+    Controller::new(design.parameters()).expect("a finished design has matching sizes")
 }
 
 /// One variant of the design's scenario.
-pub fn one(design: &Design, variant: Variant) -> Trajectory {
-    let controller =
-        Controller::new(design.parameters()).expect("a finished design has matching sizes");
-    run(&plant(design), &controller, variant)
+pub(crate) fn one(design: &Design, variant: Variant) -> Digest {
+    let run = run(&plant(design), &controller(design), variant);
+    Digest::of(design, &run)
 }
 
 /// Signals that are the same in every variant.
@@ -205,7 +323,7 @@ fn own(record: &Record) -> [(&'static str, &[f64]); 7] {
     ]
 }
 
-fn header(record: &Record, trajectories: &[Trajectory]) -> Vec<String> {
+fn header(record: &Record, runs: &[(Variant, Record)]) -> Vec<String> {
     let vector = |prefix: &str, name: &str, size: usize| -> Vec<String> {
         (1..=size).map(|i| format!("{prefix}{name}[{i}]")).collect()
     };
@@ -213,13 +331,13 @@ fn header(record: &Record, trajectories: &[Trajectory]) -> Vec<String> {
     for (name, values) in shared(record) {
         names.extend(vector("", name, values.len()));
     }
-    for trajectory in trajectories {
-        let prefix = format!("{}.", trajectory.variant.key());
+    for (variant, record) in runs {
+        let prefix = format!("{}.", variant.key());
         for (name, values) in own(record) {
             names.extend(vector(&prefix, name, values.len()));
         }
         names.extend(vector(&prefix, "fault", record.flagged.len()));
-        if trajectory.finds_the_mode() {
+        if record.mode_hat.is_some() {
             names.push(format!("{prefix}mode_hat"));
         }
     }
@@ -228,27 +346,22 @@ fn header(record: &Record, trajectories: &[Trajectory]) -> Vec<String> {
 
 /// Per variant `mse` and `vaf`, each measured and true, one number per tracked output; of the
 /// deadbeat bound the true `mse` alone. Where the mode is found from the readings, in how many samples
-/// another was found than the plant was in, and at most how many in a row. Beside them the `warnings`, one sentence each.
-fn metrics(
-    design: &Design,
-    trajectories: &[Trajectory],
-    bound: Option<&[f64]>,
-    warnings: &[String],
-) -> String {
-    let tracked = &design.controller.feedback.tracked;
-    let of = |trajectory: &Trajectory| {
-        let merits = trajectory.merits(tracked);
+/// another was found than the plant was in, and at most how many in a row. Beside them the `warnings`, one
+/// sentence each.
+fn metrics(runs: &[Digest], bound: Option<&[f64]>, warnings: &[String]) -> String {
+    let of = |run: &Digest| {
+        let merits = run.merits();
         let list = |pick: fn(&Merits) -> f64| merits.iter().map(pick).collect::<Vec<f64>>();
         let mut value = json!({
             "mse": { "measured": list(|m| m.measured.mse), "true": list(|m| m.truth.mse) },
             "vaf": { "measured": list(|m| m.measured.vaf), "true": list(|m| m.truth.vaf) },
         });
-        if let Some(wrong) = trajectory.wrong_modes() {
+        if let Some(wrong) = run.wrong_modes() {
             value["wrong_mode"] = json!({ "samples": wrong.samples, "longest": wrong.longest });
         }
-        (trajectory.variant.key().to_string(), value)
+        (run.variant.key().to_string(), value)
     };
-    let mut variants: Map<String, Value> = trajectories.iter().map(of).collect();
+    let mut variants: Map<String, Value> = runs.iter().map(of).collect();
     if let Some(mse) = bound {
         variants.insert(BOUND.into(), json!({ "mse": { "true": mse } }));
     }
@@ -260,7 +373,7 @@ fn metrics(
 const BOUND: &str = "deadbeat_bound";
 
 /// The same as a small table for a person.
-fn summary(design: &Design, trajectories: &[Trajectory], bound: Option<&[f64]>) -> String {
+fn summary(design: &Design, runs: &[Digest], bound: Option<&[f64]>) -> String {
     let mut text = format!(
         "{}: {} samples of {} s\n\n{:<16}{:<12}{:>14}{:>14}{:>12}{:>12}\n",
         design.name,
@@ -275,10 +388,10 @@ fn summary(design: &Design, trajectories: &[Trajectory], bound: Option<&[f64]>) 
     );
     let tracked = &design.controller.feedback.tracked;
     let mut constant = false;
-    for trajectory in trajectories {
-        let merits = trajectory.merits(tracked);
+    for run in runs {
+        let merits = run.merits();
         for (row, (merits, &output)) in merits.iter().zip(tracked).enumerate() {
-            let varies = varies(trajectory, row);
+            let varies = run.varies(row);
             constant |= !varies;
             let vaf = |value: f64| match varies {
                 true => format!("{value:.3}"),
@@ -287,7 +400,7 @@ fn summary(design: &Design, trajectories: &[Trajectory], bound: Option<&[f64]>) 
             let _ = writeln!(
                 text,
                 "{:<16}{:<12}{:>14.5e}{:>14.5e}{:>12}{:>12}",
-                trajectory.variant.key(),
+                run.variant.key(),
                 design.signals.outputs[output].name,
                 merits.measured.mse,
                 merits.truth.mse,
@@ -300,7 +413,7 @@ fn summary(design: &Design, trajectories: &[Trajectory], bound: Option<&[f64]>) 
         let name = &design.signals.outputs[output].name;
         let _ = writeln!(text, "{BOUND:<16}{name:<12}{:>14}{mse:>14.5e}", "");
     }
-    for wrong in trajectories.iter().filter_map(Trajectory::wrong_modes) {
+    for wrong in runs.iter().filter_map(Digest::wrong_modes) {
         let _ = writeln!(
             text,
             "\nmode found from the readings: another than the plant's in {} samples, at most {} in a row",
@@ -314,14 +427,4 @@ fn summary(design: &Design, trajectories: &[Trajectory], bound: Option<&[f64]>) 
     }
     text.push('\n');
     text
-}
-
-/// Whether the reference of a tracked output moves at all.
-fn varies(trajectory: &Trajectory, row: usize) -> bool {
-    let mut values = trajectory
-        .records
-        .iter()
-        .map(|record| record.reference[row]);
-    let first = values.next();
-    values.any(|value| Some(value) != first)
 }

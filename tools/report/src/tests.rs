@@ -2,8 +2,8 @@
 
 use super::figure::{Figure, Mark, Series};
 use super::page::{Column, KeyNumber, Page, Row, Section, Table};
-use super::simulate::SimulateError;
-use super::{demo, svg};
+use super::simulate::{Extent, SimulateError, TableOfSamples};
+use super::{Digest, demo, svg};
 use ftc_control::parameters::{
     Compensation, Estimator, EstimatorMethod, FeedbackGains, Observer, ObserverKind, StateFeedback,
 };
@@ -11,7 +11,7 @@ use ftc_control::{Controller, Matrix};
 use ftc_design::{ControllerDesign, Design, Signal, Signals};
 use ftc_plant::scenario::{FaultEvent, FaultKind, ModeInterval, Waveform};
 use ftc_plant::{Mode, OperatingPoint, Scenario, SwitchedPlant};
-use ftc_simulate::{PlantSimulator, Trajectory, Variant, run};
+use ftc_simulate::{PlantSimulator, Variant, run};
 use nalgebra::DMatrix;
 use proptest::prelude::*;
 use std::path::PathBuf;
@@ -162,11 +162,11 @@ fn hostile(mut design: Design) -> Design {
     design
 }
 
-fn simulate(design: &Design) -> Vec<Trajectory> {
+fn simulate(design: &Design) -> Vec<Digest> {
     let plant = PlantSimulator::new(design.plant.clone(), design.scenario.clone());
     let controller = Controller::new(design.parameters()).unwrap();
     Variant::ALL
-        .map(|variant| run(&plant, &controller, variant))
+        .map(|variant| Digest::of(design, &run(&plant, &controller, variant)))
         .into()
 }
 
@@ -224,12 +224,12 @@ fn check_page(page: &Page) -> String {
 }
 
 /// Pages for the browser test, written where it looks for them.
-fn keep(name: &str, design: &Design, trajectories: &[Trajectory]) {
+fn keep(name: &str, design: &Design, runs: &[Digest]) {
     let folder = PathBuf::from(env!("CARGO_MANIFEST_DIR"))
         .join("../../target/pages")
         .join(name);
     std::fs::create_dir_all(&folder).expect("a folder");
-    for (name, text) in super::files(design, trajectories, &[], super::page::Section::new("None")) {
+    for (name, text) in super::files(design, runs, &[], super::page::Section::new("None")) {
         if name.ends_with(".svg") {
             check_svg(&text);
         }
@@ -241,8 +241,8 @@ fn keep(name: &str, design: &Design, trajectories: &[Trajectory]) {
 fn the_papers_example_makes_a_whole_page() {
     for (name, noise) in [("paper", 0.0), ("noisy", 0.005)] {
         let design = paper(noise);
-        let trajectories = simulate(&design);
-        let page = demo::page(&design, &trajectories, &[]);
+        let runs = simulate(&design);
+        let page = demo::page(&design, &runs, &[]);
         assert_eq!(page.figures().count(), 2 + 2 + 2 + 2 + 1);
         let html = check_page(&page);
         assert!(
@@ -251,7 +251,7 @@ fn the_papers_example_makes_a_whole_page() {
                 && html.contains("mode 2: second")
         );
         assert!(html.len() < 1_000_000, "{}", html.len());
-        keep(name, &design, &trajectories);
+        keep(name, &design, &runs);
     }
 }
 
@@ -259,20 +259,20 @@ fn the_papers_example_makes_a_whole_page() {
 fn any_size_makes_a_page_below_a_megabyte() {
     for (outputs, disturbances, steps) in [(1, 0, 1), (1, 0, 300), (12, 3, 20_000)] {
         let design = lags(outputs, disturbances, steps);
-        let trajectories = simulate(&design);
-        let html = check_page(&demo::page(&design, &trajectories, &[]));
+        let runs = simulate(&design);
+        let html = check_page(&demo::page(&design, &runs, &[]));
         assert!(html.len() < 1_000_000, "{} bytes", html.len());
-        keep(&format!("lags-{outputs}-{steps}"), &design, &trajectories);
+        keep(&format!("lags-{outputs}-{steps}"), &design, &runs);
     }
 }
 
 #[test]
 fn user_strings_cannot_break_out() {
     let design = hostile(paper(0.005));
-    let trajectories = simulate(&design);
-    let html = check_page(&demo::page(&design, &trajectories, &[]));
+    let runs = simulate(&design);
+    let html = check_page(&demo::page(&design, &runs, &[]));
     assert!(html.contains("&lt;script&gt;"));
-    keep("hostile", &design, &trajectories);
+    keep("hostile", &design, &runs);
 }
 
 #[test]
@@ -284,8 +284,8 @@ fn nothing_simulated_is_said_so() {
 #[test]
 fn a_lost_sensor_leaves_a_gap_in_its_curve() {
     let design = lags(1, 0, 300);
-    let trajectories = simulate(&design);
-    let page = demo::page(&design, &trajectories, &[]);
+    let runs = simulate(&design);
+    let page = demo::page(&design, &runs, &[]);
     let document = svg::document(page.figures().next().expect("an output"));
     let tree = roxmltree::Document::parse(&document).expect("well-formed");
     let measured = tree
@@ -357,22 +357,38 @@ proptest! {
     }
 }
 
-/// What would not fit into memory is refused before it begins, with what would fit.
+/// What would fill a disk is refused before it begins, with what would fit; the estimate is that of the
+/// table within a factor of two.
 #[test]
 fn a_scenario_that_is_too_long_is_refused_with_an_estimate() {
-    let mut design = paper(0.0);
-    let one = crate::simulate::memory(&design, false) / design.scenario.steps;
-    design.scenario.steps = 1_000_000_000;
-    let refused = crate::simulate::simulate(&design, Vec::new(), false);
+    struct Bytes(u64);
+    impl std::io::Write for &mut Bytes {
+        fn write(&mut self, bytes: &[u8]) -> std::io::Result<usize> {
+            self.0 += bytes.len() as u64;
+            Ok(bytes.len())
+        }
+        fn flush(&mut self) -> std::io::Result<()> {
+            Ok(())
+        }
+    }
+    let design = paper(0.005);
+    let extent = |steps| Extent::new(design.plant.dimensions(), 2, steps, false);
+    let mut written = Bytes(0);
+    let mut table = TableOfSamples::new(&mut written, 1.0);
+    crate::simulate::simulate(&design, Vec::new(), false, &mut table).unwrap();
+    table.finish().unwrap();
+    let estimate = extent(design.scenario.steps).bytes;
+    assert!(
+        written.0 < 2 * estimate && estimate < 2 * written.0,
+        "{} bytes, estimated {estimate}",
+        written.0
+    );
+    let refused = extent(1_000_000_000).check();
     let Err(error @ SimulateError::TooLong { most, .. }) = refused else {
-        panic!("it ran")
+        panic!("it is accepted")
     };
     let what = error.to_string();
     assert!(what.contains("scenario.steps is 1000000000"), "{what}");
     assert!(what.ends_with(&format!("at most {most}")), "{what}");
-    assert!(most.abs_diff((8 << 30) / one) <= 1, "{what}");
-    // A sample takes at least its numbers.
-    let record = &simulate(&paper(0.0))[0].records[0];
-    let numbers = record.y.len() * 6 + record.x.len() * 2 + record.u.len() + record.reference.len();
-    assert!(one >= 3 * 8 * numbers as u64);
+    assert!(extent(most).check().is_ok() && extent(most + most / 1000).check().is_err());
 }

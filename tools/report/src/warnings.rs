@@ -8,8 +8,7 @@ use ftc_design::warnings::{Doubt, Guess, LoggedMovement, Warning};
 use ftc_design::weights::{Weight, WeightShares};
 use ftc_design::{Design, Objective};
 use ftc_plant::deviation::Destabilised;
-use ftc_simulate::Trajectory;
-use ftc_simulate::warnings::RunWarning;
+use ftc_simulate::warnings::{RunWarning, RunWatch};
 use std::fmt::Write;
 
 /// Of a design and the file it was made from.
@@ -128,8 +127,8 @@ fn weak_weights(given: &[Weight], design: &Design) -> Option<String> {
 const UNKNOWN_NOISE: &str = "neither scenario.noise nor estimator.threshold is given: a residual of a thousandth of an \
     output's nominal value is then a fault; give the noise of your sensors";
 
-/// Of the runs of a design.
-pub fn of_runs(design: &Design, runs: &[Trajectory]) -> Vec<String> {
+/// Of the runs of a design, each with the first tick that it could not be integrated through.
+pub fn of_runs(design: &Design, runs: &[(RunWatch<'_>, Option<u64>)]) -> Vec<String> {
     let warnings = ftc_simulate::warnings::of_runs(design, runs);
     let calmer = calmer(design);
     warnings

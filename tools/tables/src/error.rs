@@ -47,6 +47,18 @@ pub enum Error {
         /// The line, from 1.
         line: u64,
     },
+    /// A first line that is no header.
+    #[error("{0}")]
+    Header(String),
+    /// A first row below the header in which no cell is a number or a time.
+    #[error(
+        "line {line} holds no number or time in any column: delete it if it tells units or comments, and keep one header \
+         line"
+    )]
+    Words {
+        /// The line, from 1.
+        line: u64,
+    },
     /// More rows than are read.
     #[error("has more than {MOST_ROWS} rows: shorten it")]
     TooManyRows,
@@ -151,8 +163,9 @@ pub enum TimeError {
     /// A gap, a doubled row or a wrong rate.
     #[error(
         "{place}: {column} goes from {before} to {now}, but sample_time is {sample_time}: \
-         record without gaps, one row per sample{}",
-        coarse(*resolution, *sample_time)
+         record without gaps, one row per sample{}{}",
+        coarse(*resolution, *sample_time),
+        other_unit(column, now - before, *sample_time)
     )]
     Step {
         /// Where.
@@ -204,6 +217,24 @@ pub enum TimeError {
         /// Time of the row.
         now: f64,
     },
+}
+
+/// Units in which times may be meant, and their seconds.
+const UNITS: [(&str, f64); 5] = [
+    ("ms", 1e-3),
+    ("us", 1e-6),
+    ("ns", 1e-9),
+    ("min", 60.0),
+    ("h", 3600.0),
+];
+
+/// The unit in which a time step would be right, where there is one.
+fn other_unit(column: &str, step: f64, sample_time: f64) -> String {
+    let fits = |unit: &f64| (step * unit / sample_time - 1.0).abs() < 0.01;
+    let unit = UNITS.iter().find(|(_, seconds)| fits(seconds));
+    unit.map_or(String::new(), |(unit, _)| {
+        format!("; if its times are in {unit}, name the column {column} [{unit}]")
+    })
 }
 
 fn coarse(resolution: f64, sample_time: f64) -> String {

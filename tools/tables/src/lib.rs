@@ -23,7 +23,10 @@ const QUOTATION: usize = 60;
 
 /// A quotation from the user's file: printable and short.
 pub(crate) fn quote(text: &str) -> String {
-    let clean: String = text.chars().filter(|c| !c.is_control()).collect();
+    let clean: String = text
+        .chars()
+        .map(|c| if c.is_control() { '\u{fffd}' } else { c })
+        .collect();
     match clean.char_indices().nth(QUOTATION) {
         Some((cut, _)) => format!("'{}...'", &clean[..cut]),
         None => format!("'{clean}'"),

@@ -89,6 +89,7 @@ impl Table {
         let (said, start) = said_delimiter(&head);
         let delimiter = said.unwrap_or_else(|| likely_delimiter(&head[start..]));
         let head = head.split_off(start);
+        refuse_header(&head, delimiter, 1 + u64::from(start > 0))?;
         let mut reader = ReaderBuilder::new()
             .delimiter(delimiter)
             .trim(Trim::All)
@@ -125,6 +126,11 @@ impl Table {
             return Ok(None);
         };
         if !row.is_empty() {
+            if row.place.row == 1 && !row.cells.iter().any(|cell| self.is_number_or_time(cell)) {
+                return Err(Error::Words {
+                    line: row.place.line,
+                });
+            }
             return self.whole(row).map(Some);
         }
         while let Some(later) = self.next_record()? {
@@ -161,8 +167,8 @@ impl Table {
         if found >= needed && !surplus {
             return Ok(row);
         }
-        let advice = if self.delimiter == b',' && found == 2 * needed {
-            "separate columns by semicolons where numbers have decimal commas"
+        let advice = if self.delimiter == b',' && found > needed {
+            "separate columns by semicolons where numbers have decimal commas, and give every row a cell for each column"
         } else {
             "give every row a cell for each column"
         };
@@ -195,9 +201,13 @@ impl Table {
     /// The number that a text is, under the file's decimal mark.
     pub(crate) fn parse(&self, text: &str) -> Option<f64> {
         if self.delimiter != b',' && text.contains(',') && !text.contains('.') {
-            return text.replacen(',', ".", 1).parse().ok();
+            return parse(&text.replacen(',', ".", 1));
         }
-        text.parse().ok()
+        parse(text)
+    }
+
+    fn is_number_or_time(&self, text: &str) -> bool {
+        self.parse(text).is_some() || text.starts_with(|c: char| c.is_ascii_digit())
     }
 
     /// One file has one decimal mark: 1,234 beside 1.5 may be a thousand.
@@ -238,6 +248,57 @@ impl Table {
             advice,
         }
     }
+}
+
+/// A number, also with Fortran's exponent (1.5D+02) or the minus sign of a word processor.
+fn parse(text: &str) -> Option<f64> {
+    text.parse().ok().or_else(|| {
+        let plain = text.replace('\u{2212}', "-").replace(['D', 'd'], "e");
+        plain.parse().ok().filter(|_| plain != text)
+    })
+}
+
+/// A first line that is a comment, numbers, markup or one long word is no header.
+fn refuse_header(head: &[u8], delimiter: u8, number: u64) -> Result<(), Error> {
+    let text = String::from_utf8_lossy(head);
+    let mut lines = text.split(['\n', '\r']).filter(|line| !line.is_empty());
+    let Some(first) = lines.next().map(str::trim) else {
+        return Err(Error::Header(
+            "is empty: name a file that holds a table".into(),
+        ));
+    };
+    if first.starts_with('<') {
+        return Err(Error::NotText("a web page or XML"));
+    }
+    if first.starts_with(['#', '%']) || first.starts_with("//") {
+        let what = format!("line {number} is a comment, {}", quote(first));
+        return Err(Error::Header(format!(
+            "{what}: delete what stands above the header"
+        )));
+    }
+    let mark = char::from(delimiter);
+    let numeric = |cell: &str| {
+        let cell = cell.trim().trim_matches('"');
+        parse(&cell.replacen(',', ".", 1)).is_some_and(f64::is_finite)
+    };
+    if first.split(mark).all(numeric) {
+        return Err(Error::Header(format!(
+            "line {number} holds numbers where the names of the columns stand: add a header above it"
+        )));
+    }
+    let alone = !first.contains(mark);
+    let second = lines.next().unwrap_or_default();
+    let cells = second.split(['|', ' ']).filter(|cell| !cell.is_empty());
+    if alone
+        && second.contains(['|', ' '])
+        && cells.clone().count() > 1
+        && cells.clone().all(numeric)
+    {
+        return Err(Error::Header(
+            "has columns that neither commas, semicolons nor tabs separate: separate them by one of these".into(),
+        ));
+    }
+    Ok(())
 }
 
 /// What a cell holds, as a sentence tells it.

@@ -13,6 +13,7 @@ use crate::blocks::{BlockKind, BlockName};
 use crate::certificate::{Enclosure, LyapunovMatrix, largest_ratio};
 use crate::lmi::{Inequality, Problem};
 use crate::matrices::{dense, plain};
+use crate::parallel;
 use crate::riccati;
 use ftc_control::parameters::{LostSet, ObserverKind};
 use ftc_plant::{SwitchedPlant, spectral_radius};
@@ -137,13 +138,16 @@ pub(super) fn add(
     ratio: f64,
 ) -> ObserverDesign {
     let sensors = plant.dimensions().outputs;
-    let kalman = |set: Vec<usize>| {
+    let kalman = |set: &Vec<usize>| {
         let gains = filters.iter().map(|filter| {
-            let gain = filter.gain(&set, ratio)?;
+            let gain = filter.gain(set, ratio)?;
             (spectral_radius(&filter.error(&gain)) < 1.0 - 1e-9).then_some(gain)
         });
-        gains.collect::<Option<Vec<_>>>().map(|gains| (set, gains))
+        gains
+            .collect::<Option<Vec<_>>>()
+            .map(|gains| (set.clone(), gains))
     };
+    let served = parallel::each(&sets(sensors), kalman);
     let healthy = (design.observer.kind == ObserverKind::Kalman).then(|| {
         let units = per_unit(&design);
         let numbered = filters.iter().enumerate();
@@ -153,7 +157,7 @@ pub(super) fn add(
     });
     let candidates = Candidates {
         filters,
-        served: sets(sensors).into_iter().filter_map(kalman).collect(),
+        served: served.into_iter().flatten().collect(),
         healthy,
     };
     if candidates.served.is_empty() {
@@ -236,16 +240,17 @@ impl Candidates<'_> {
                 let demands: Vec<Demand> = healthy.iter().cloned().map(Demand::Fixed).collect();
                 found.lists.push(vec![common_function(&demands, decay)?]);
             }
-            for (set, gains) in &self.served {
+            let sets = parallel::every(&self.served, |(set, gains)| {
                 let of = |filter| Demand::Free(filter, set);
                 let demands: Vec<Demand> = self.filters.iter().map(of).collect();
                 let function = common_function(&demands, decay)?;
                 let modes = self.filters.iter().zip(gains);
                 let blended =
                     modes.map(|(filter, gain)| blended(filter, set, gain, &function, decay));
-                found
-                    .sets
-                    .push((set.clone(), blended.collect::<Option<Vec<_>>>()?));
+                Some((set.clone(), blended.collect::<Option<Vec<_>>>()?, function))
+            })?;
+            for (set, gains, function) in sets {
+                found.sets.push((set, gains));
                 found.lists.push(vec![function]);
             }
             Some(found)

@@ -8,7 +8,7 @@ use super::gain::Channel;
 use super::{Models, RunningLoop, TOLERANCE, command_deviation};
 use crate::observer::{self, Candidate};
 use crate::verdict::DesignError;
-use crate::{ObserverChoice, ObserverDesign, ObserverSpec, SolverFailure, StateFeedback};
+use crate::{ObserverChoice, ObserverDesign, ObserverSpec, SolverFailure, StateFeedback, parallel};
 use ftc_control::parameters::{Observer, ObserverKind};
 use ftc_plant::SwitchedPlant;
 use ftc_plant::scaling::Scaling;
@@ -36,12 +36,13 @@ pub(crate) fn choose(
     let references: Vec<f64> = (0..plant.modes.len())
         .map(|mode| reference(&models, control, mode))
         .collect();
-    let mut ranked: Vec<(Merit, Candidate)> = observer::candidates(plant, spec, scaling)?
-        .into_iter()
-        .filter_map(|candidate| {
-            let judged = merit(&models, spec, &references, &candidate.observer)?;
-            Some((judged, candidate))
-        })
+    let candidates = observer::candidates(plant, spec, scaling)?;
+    let judged = parallel::each(&candidates, |candidate| {
+        merit(&models, spec, &references, &candidate.observer)
+    });
+    let judged = judged.into_iter().zip(candidates);
+    let mut ranked: Vec<(Merit, Candidate)> = judged
+        .filter_map(|(judged, candidate)| Some((judged?, candidate)))
         .collect();
     ranked.sort_by(|(a, _), (b, _)| {
         let within = |merit: &Merit| merit.excess <= 1.0 + TOLERANCE;

@@ -5,7 +5,7 @@ use super::synthesis::{AGREEMENT, Levels, Optimum, Problem, RELAXATIONS, TRANSFO
 use super::transformation::{Part, Transformation};
 use super::{REJECTION, StateFeedback, riccati, structured};
 use crate::verdict::{DesignError, Uncertified};
-use crate::{CertificateError, Lyapunov};
+use crate::{CertificateError, Lyapunov, parallel};
 
 /// Floating-point operations beyond which a `dwell` design is left to Riccati equations.
 const LARGEST_WORK: f64 = 6e11;
@@ -81,19 +81,22 @@ impl Problem<'_> {
         {
             return Some(design);
         }
-        let least = groups.iter().map(|group| {
+        let mut least = parallel::every(&groups, |group| {
             let regulated = Transformation::of_regulated(&self.models, group, self.spec.decay)?;
             self.settled_level(&regulated.with_signals(&self.models, group), group)
-        });
-        let mut least = least.collect::<Option<Vec<_>>>()?;
+        })?;
         let smallest = RELAXATIONS[0];
         if let Some(design) = self.with_margin(&groups, &least, smallest) {
             return Some(design);
         }
         // Once more, in the coordinates that the first answer suggests.
-        for (group, found) in groups.iter().zip(&mut least) {
+        let pairs: Vec<(&Vec<usize>, &Found)> = groups.iter().zip(&least).collect();
+        let again = parallel::each(&pairs, |(group, found)| {
             let again = self.direct_level(&found.optimum.transformation, group);
-            if let Some(again) = again.filter(|again| again.optimum.level < found.optimum.level) {
+            again.filter(|again| again.optimum.level < found.optimum.level)
+        });
+        for (found, again) in least.iter_mut().zip(again) {
+            if let Some(again) = again {
                 *found = again;
             }
         }
@@ -109,12 +112,18 @@ impl Problem<'_> {
         relaxation: f64,
     ) -> Option<StateFeedback> {
         let mut levels = Levels::new(self);
-        let mut parts = Vec::new();
-        for (group, found) in groups.iter().zip(least) {
-            let level = levels.set(group, &found.optimum, relaxation);
-            parts.extend(self.direct_centre(group, &found.optimum.transformation, level)?);
-        }
-        self.certified(parts, Some(levels)).ok()
+        let problems: Vec<(&Vec<usize>, &Optimum, f64)> = groups
+            .iter()
+            .zip(least)
+            .map(|(group, found)| {
+                let level = levels.set(group, &found.optimum, relaxation);
+                (group, &found.optimum, level)
+            })
+            .collect();
+        let parts = parallel::every(&problems, |(group, optimum, level)| {
+            self.direct_centre(group, &optimum.transformation, *level)
+        })?;
+        self.certified(parts.concat(), Some(levels)).ok()
     }
 
     /// Gains that give up as little of its level as each group can: from the central path or of largest
@@ -236,10 +245,9 @@ impl Problem<'_> {
 
     /// Gains of every mode by Riccati equations: certified, though not the optimum.
     fn by_riccati(&self) -> Option<StateFeedback> {
-        let mut levels = Levels::new(self);
-        let mut parts = Vec::new();
-        for (mode, model) in self.models.iter().enumerate() {
-            let group = [mode];
+        let modes: Vec<usize> = (0..self.models.len()).collect();
+        let found = parallel::every(&modes, |&mode| {
+            let (model, group) = (&self.models[mode], [mode]);
             let transformation =
                 Transformation::of_regulated(&self.models, &group, self.spec.decay)?;
             let transformation = transformation.with_signals(&self.models, &group);
@@ -250,8 +258,14 @@ impl Problem<'_> {
                 bound: transformation.restore_level(found.bound),
                 transformation,
             };
-            levels.set(&group, &least, 0.0);
-            parts.extend(least.transformation.restore(vec![found.part]));
+            let part = least.transformation.restore(vec![found.part]);
+            Some((least, part))
+        })?;
+        let mut levels = Levels::new(self);
+        let mut parts = Vec::new();
+        for (mode, (least, part)) in found.into_iter().enumerate() {
+            levels.set(&[mode], &least, 0.0);
+            parts.extend(part);
         }
         self.certified(parts, Some(levels)).ok()
     }

@@ -15,7 +15,7 @@ use crate::certificate::{ControlCertificate, FactoredLyapunov};
 use crate::lmi::Margin;
 use crate::units::other_scaling;
 use crate::verdict::{DesignError, SolverFailure, infeasible};
-use crate::{ControlSpec, Lyapunov, Objective, Run, Solver, Step, Units};
+use crate::{ControlSpec, Lyapunov, Objective, Run, Solver, Step, Units, parallel};
 use ftc_plant::scaling::Scaling;
 use ftc_plant::{Dimensions, SwitchedPlant, spectral_radius};
 use nalgebra::DMatrix;
@@ -282,15 +282,10 @@ impl Problem<'_> {
 
     /// Step by step: stabilising gains first, which decides feasibility, then the least level from there.
     fn step_by_step(&self, optimised: bool) -> Result<StateFeedback, DesignError> {
-        let mut stable = Vec::new();
-        for group in self.groups() {
-            match self.stabilised(&group)? {
-                Verdict::Stable(parts) => stable.push(parts),
-                Verdict::Conflict(margin) => {
-                    return Err(infeasible(margin.margin, margin.weights));
-                }
-            }
-        }
+        let stable = parallel::all(&self.groups(), |group| match self.stabilised(group)? {
+            Verdict::Stable(parts) => Ok(parts),
+            Verdict::Conflict(margin) => Err(infeasible(margin.margin, margin.weights)),
+        })?;
         match optimised {
             true => self.attenuate(&stable),
             false => self.certified(stable.concat(), None),
@@ -355,10 +350,8 @@ impl Problem<'_> {
     /// Theorem T2: the least `gamma`, gains that reach it up to the relaxation, and their proof.
     fn attenuate(&self, stable: &[Vec<Part>]) -> Result<StateFeedback, DesignError> {
         let groups = self.groups();
-        let mut least = Vec::new();
-        for (group, start) in groups.iter().zip(stable) {
-            least.push(self.least_level(group, start)?);
-        }
+        let starts: Vec<(&Vec<usize>, &Vec<Part>)> = groups.iter().zip(stable).collect();
+        let least = parallel::all(&starts, |(group, start)| self.least_level(group, start))?;
         let mut outcome = Err(DesignError::Solver(SolverFailure::NumericalTrouble));
         for relaxation in RELAXATIONS {
             outcome = self.centred(&groups, &least, relaxation);
@@ -377,24 +370,30 @@ impl Problem<'_> {
         relaxation: f64,
     ) -> Result<StateFeedback, DesignError> {
         let mut levels = Levels::new(self);
-        let mut parts = Vec::new();
-        for (group, least) in groups.iter().zip(least) {
-            let (transformation, level) =
-                (&least.transformation, levels.set(group, least, relaxation));
+        let problems: Vec<(&Vec<usize>, &Transformation, f64)> = groups
+            .iter()
+            .zip(least)
+            .map(|(group, least)| {
+                let level = levels.set(group, least, relaxation);
+                (group, &least.transformation, level)
+            })
+            .collect();
+        let parts = parallel::all(&problems, |&(group, transformation, level)| {
             let structured = match self.run.solver {
                 Solver::Structured => self.direct_centre(group, transformation, level),
                 Solver::General => None,
             };
-            parts.extend(match structured {
-                Some(found) => found,
+            match structured {
+                Some(found) => Ok(found),
                 None => {
                     let view = transformation.view(&self.models);
                     let level = transformation.view_level(level);
-                    transformation.restore(theorem::centred(&view, self.spec, group, level)?)
+                    let found = theorem::centred(&view, self.spec, group, level)?;
+                    Ok::<_, SolverFailure>(transformation.restore(found))
                 }
-            });
-        }
-        self.certified(parts, Some(levels))
+            }
+        })?;
+        self.certified(parts.concat(), Some(levels))
     }
 
     /// Puts the parts together in physical units, and proves the whole.

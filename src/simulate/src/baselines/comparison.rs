@@ -1,8 +1,9 @@
 //! The baselines of one design, in the scenario of that design.
 
 use super::predictive::{Predictive, PredictiveError, PredictiveSpec};
-use super::{additive, deadbeat_bound, response_delay};
-use crate::{PlantSimulator, Trajectory, Variant, run, run_with};
+use super::{DeadbeatSum, additive, response_delay};
+use crate::closed_loop::{Loop, Record, visit};
+use crate::{PlantSimulator, Variant};
 use ftc_control::{Controller, ControllerError};
 use ftc_design::{Design, DesignError};
 
@@ -30,62 +31,114 @@ pub enum BaselineError {
 }
 
 /// The additive FTC of the paper's section III and model predictive control.
-///
-/// # Errors
-/// Where one of them cannot be designed for this plant.
-pub fn trajectories(
-    design: &Design,
-    plant: &PlantSimulator,
-) -> Result<Vec<Trajectory>, BaselineError> {
-    let parameters = additive(design)?;
-    let printed = run(plant, &Controller::new(parameters)?, Variant::Additive);
-    let delayed = design.controller.feedback.latency > 0;
-    let spec = predictive(design, &printed)?;
-    let mode = plant.initial_state().mode;
-    let mut controller = Predictive::new(&design.plant, &spec, mode)?;
-    if delayed {
-        controller = controller.one_sample_late();
+pub struct Baselines {
+    additive: Controller,
+    predictive: Predictive,
+    delayed: bool,
+}
+
+impl Baselines {
+    /// Designs both.
+    ///
+    /// # Errors
+    /// Where one of them cannot be designed for this plant.
+    pub fn new(design: &Design, plant: &PlantSimulator) -> Result<Self, BaselineError> {
+        let additive = Controller::new(additive(design)?)?;
+        let delayed = design.controller.feedback.latency > 0;
+        let spec = predictive(design, disturbance_power(plant, &additive))?;
+        let mode = plant.initial_state().mode;
+        let mut predictive = Predictive::new(&design.plant, &spec, mode)?;
+        if delayed {
+            predictive = predictive.one_sample_late();
+        }
+        Ok(Self {
+            additive,
+            predictive,
+            delayed,
+        })
     }
-    let predicted = run_with(plant, &mut controller, Variant::Predictive, delayed);
-    Ok(vec![printed, predicted])
+
+    /// Their loops, at rest.
+    pub fn loops<'a>(&'a mut self, plant: &'a PlantSimulator) -> [(Variant, Loop<'a>); 2] {
+        let predictive = Box::new(&mut self.predictive);
+        [
+            (
+                Variant::Additive,
+                Loop::tolerant(plant, &self.additive, Variant::Additive),
+            ),
+            (
+                Variant::Predictive,
+                Loop::new(plant, predictive, self.delayed),
+            ),
+        ]
+    }
+}
+
+/// Root mean square of each disturbance (s) over the scenario.
+fn disturbance_power(plant: &PlantSimulator, controller: &Controller) -> Vec<f64> {
+    let mut squares = vec![0.0; plant.initial_state().disturbance.len()];
+    visit(plant, controller, Variant::Additive, |seen| {
+        for (sum, value) in squares.iter_mut().zip(&seen.plant.disturbance) {
+            *sum += value.powi(2);
+        }
+    });
+    let samples = plant.scenario().steps.max(1) as f64;
+    squares.iter().map(|sum| (sum / samples).sqrt()).collect()
 }
 
 /// The predictive controller with the design's weights and limits. Its filter is told the noise
 /// and the mean power of the scenario's disturbance.
-fn predictive(design: &Design, played: &Trajectory) -> Result<PredictiveSpec, BaselineError> {
+fn predictive(design: &Design, disturbance: Vec<f64>) -> Result<PredictiveSpec, BaselineError> {
     let proof = design.proof.as_ref().ok_or(BaselineError::NoWeights)?;
     let asked = &proof.state_feedback;
     let outputs = design.signals.outputs.iter();
     let noise = outputs.zip(&design.scenario.noise);
-    let channels = design.plant.dimensions().disturbances;
-    let power = |channel: usize| {
-        let records = &played.records;
-        let sum: f64 = records.iter().map(|r| r.disturbance[channel].powi(2)).sum();
-        (sum / records.len().max(1) as f64).sqrt()
-    };
-    Ok(PredictiveSpec {
-        tracked: design.controller.feedback.tracked.clone(),
-        output_weight: asked.output_weight.clone(),
-        input_weight: asked.input_weight.clone(),
-        limits: design.signals.input_limits(),
-        noise: noise
-            .map(|(output, noise)| noise.max(LEAST_NOISE * output.nominal))
-            .collect(),
-        disturbance: (0..channels).map(power).collect(),
-        horizon: HORIZON,
-    })
+    let noise = noise.map(|(output, noise)| noise.max(LEAST_NOISE * output.nominal));
+    let tracked = design.controller.feedback.tracked.clone();
+    let mut spec = PredictiveSpec::new(&design.plant, tracked, noise.collect());
+    spec.output_weight.clone_from(&asked.output_weight);
+    spec.input_weight.clone_from(&asked.input_weight);
+    spec.limits = design.signals.input_limits();
+    spec.disturbance = disturbance;
+    spec.horizon = HORIZON;
+    Ok(spec)
 }
 
-/// Per tracked output, the deadbeat bound of the scenario's reference: the output follows as many samples late as the plant and the latency need.
-pub fn bound(design: &Design, played: &Trajectory) -> Vec<f64> {
-    let feedback = &design.controller.feedback;
-    let tracked = feedback.tracked.iter().enumerate();
-    tracked
-        .map(|(index, &output)| {
-            let reference: Vec<f64> = played.records.iter().map(|r| r.reference[index]).collect();
-            let start = played.records.first().map_or(0.0, |r| r.y_true[output]);
-            let delay = response_delay(&design.plant, output) + feedback.latency;
-            deadbeat_bound(&reference, start, delay)
-        })
-        .collect()
+/// Per tracked output, the deadbeat bound of the scenario's reference, gathered sample by sample: the
+/// output follows as many samples late as the plant and the latency need.
+#[derive(Debug)]
+pub struct Bound<'a> {
+    design: &'a Design,
+    sums: Vec<DeadbeatSum>,
+}
+
+impl<'a> Bound<'a> {
+    /// Nothing seen yet.
+    pub fn new(design: &'a Design) -> Self {
+        Self {
+            design,
+            sums: Vec::new(),
+        }
+    }
+
+    /// Looks at a sample.
+    pub fn see(&mut self, record: &Record) {
+        let feedback = &self.design.controller.feedback;
+        if self.sums.is_empty() {
+            let tracked = feedback.tracked.iter();
+            let sums = tracked.map(|&output| {
+                let delay = response_delay(&self.design.plant, output) + feedback.latency;
+                DeadbeatSum::new(record.y_true[output], delay)
+            });
+            self.sums = sums.collect();
+        }
+        for (sum, &reference) in self.sums.iter_mut().zip(&record.reference) {
+            sum.add(reference);
+        }
+    }
+
+    /// The bounds.
+    pub fn bounds(&self) -> Vec<f64> {
+        self.sums.iter().map(DeadbeatSum::bound).collect()
+    }
 }

@@ -3,18 +3,47 @@
 //! reference can be run ahead of, and what disturbs the output may happen to help.
 
 use ftc_plant::{Mode, SwitchedPlant};
+use std::collections::VecDeque;
 
 /// The least mean square error of an output that can follow its reference only `delay` samples
 /// late: each sample costs the square of what the reference moved meanwhile. Before the first
 /// sample the output is taken to rest at `start`.
 pub fn deadbeat_bound(reference: &[f64], start: f64, delay: usize) -> f64 {
-    let late = std::iter::repeat_n(start, delay).chain(reference.iter().copied());
-    let sum: f64 = reference
-        .iter()
-        .zip(late)
-        .map(|(now, late)| (now - late) * (now - late))
-        .sum();
-    sum / reference.len().max(1) as f64
+    let mut sum = DeadbeatSum::new(start, delay);
+    reference.iter().for_each(|&now| sum.add(now));
+    sum.bound()
+}
+
+/// [`deadbeat_bound`], gathered sample by sample.
+#[derive(Clone, Debug)]
+pub struct DeadbeatSum {
+    late: VecDeque<f64>,
+    sum: f64,
+    samples: u64,
+}
+
+impl DeadbeatSum {
+    /// An output at rest.
+    pub fn new(start: f64, delay: usize) -> Self {
+        Self {
+            late: std::iter::repeat_n(start, delay).collect(),
+            sum: 0.0,
+            samples: 0,
+        }
+    }
+
+    /// Adds a sample of the reference.
+    pub fn add(&mut self, now: f64) {
+        self.late.push_back(now);
+        let late = self.late.pop_front().unwrap_or(now);
+        self.sum += (now - late) * (now - late);
+        self.samples += 1;
+    }
+
+    /// The bound over the samples so far.
+    pub fn bound(&self) -> f64 {
+        self.sum / self.samples.max(1) as f64
+    }
 }
 
 /// The fewest samples after which any input reaches the true output `output` (0-based) in any mode,

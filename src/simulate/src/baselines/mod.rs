@@ -10,4 +10,4 @@ pub mod predictive;
 
 #[cfg(feature = "solver")]
 pub use additive::additive;
-pub use deadbeat::{deadbeat_bound, response_delay};
+pub use deadbeat::{DeadbeatSum, deadbeat_bound, response_delay};

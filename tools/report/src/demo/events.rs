@@ -21,23 +21,29 @@ pub fn any_fault_intervals(run: &Trajectory) -> Vec<[usize; 2]> {
 }
 
 fn intervals(run: &Trajectory, holds: impl Fn(&Record) -> bool) -> Vec<[usize; 2]> {
-    let mut found: Vec<[usize; 2]> = Vec::new();
+    let mut found = Intervals::default();
     for (index, record) in run.records.iter().enumerate() {
-        match found.last_mut() {
-            _ if !holds(record) => {}
-            Some([_, until]) if *until == index => *until += 1,
-            _ => found.push([index, index + 1]),
-        }
+        found.see(index, holds(record));
     }
-    found
+    found.0
 }
 
-/// How many different modes were active.
-pub fn modes_visited(run: &Trajectory) -> usize {
-    let mut modes: Vec<usize> = run.records.iter().map(|record| record.mode).collect();
-    modes.sort_unstable();
-    modes.dedup();
-    modes.len()
+/// Half-open intervals in which something holds, gathered sample by sample.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Intervals(Vec<[usize; 2]>);
+
+impl Intervals {
+    pub fn see(&mut self, index: usize, holds: bool) {
+        match self.0.last_mut() {
+            _ if !holds => {}
+            Some([_, until]) if *until == index => *until += 1,
+            _ => self.0.push([index, index + 1]),
+        }
+    }
+
+    pub fn found(&self) -> &[[usize; 2]] {
+        &self.0
+    }
 }
 
 /// How well faults were found.
@@ -53,34 +59,47 @@ pub struct Alarms {
     pub false_alarms: usize,
 }
 
-impl Alarms {
-    /// Counts over all sensors of a run.
-    pub fn of(run: &Trajectory) -> Self {
-        let sensors = run.records.first().map_or(0, |record| record.y.len());
-        let mut alarms = Self::default();
-        for sensor in 0..sensors {
-            for [from, until] in fault_intervals(run, sensor) {
-                alarms.onsets += 1;
-                let flag = (from..until).find(|k| run.records[*k].flagged[sensor]);
-                if let Some(at) = flag {
-                    alarms.found += 1;
-                    alarms.longest_delay = alarms.longest_delay.max(Some((at - from) as u64));
-                }
-            }
-            alarms.false_alarms += false_alarms(run, sensor);
-        }
-        alarms
-    }
+/// [`Alarms`], gathered sample by sample.
+#[derive(Clone, Debug)]
+pub(super) struct AlarmWatch {
+    alarms: Alarms,
+    sensors: Vec<SensorWatch>,
 }
 
-/// Flags that rise while the sensor is healthy.
-fn false_alarms(run: &Trajectory, sensor: usize) -> usize {
-    let mut before = false;
-    let mut found = 0;
-    for record in &run.records {
-        let flagged = record.flagged[sensor];
-        found += usize::from(flagged && !before && !is_faulty(record, sensor));
-        before = flagged;
+#[derive(Clone, Debug, Default)]
+struct SensorWatch {
+    /// When the present fault set in, and whether it has been flagged.
+    fault: Option<(u64, bool)>,
+    flagged: bool,
+}
+
+impl AlarmWatch {
+    pub fn new(sensors: usize) -> Self {
+        Self {
+            alarms: Alarms::default(),
+            sensors: vec![SensorWatch::default(); sensors],
+        }
     }
-    found
+
+    pub fn see(&mut self, record: &Record) {
+        let alarms = &mut self.alarms;
+        for (sensor, watch) in self.sensors.iter_mut().enumerate() {
+            let (faulty, flagged) = (is_faulty(record, sensor), record.flagged[sensor]);
+            alarms.false_alarms += usize::from(flagged && !watch.flagged && !faulty);
+            alarms.onsets += usize::from(faulty && watch.fault.is_none());
+            watch.fault = faulty.then(|| {
+                let (from, found) = watch.fault.unwrap_or((record.tick, false));
+                if flagged && !found {
+                    alarms.found += 1;
+                    alarms.longest_delay = alarms.longest_delay.max(Some(record.tick - from));
+                }
+                (from, found || flagged)
+            });
+            watch.flagged = flagged;
+        }
+    }
+
+    pub fn alarms(&self) -> Alarms {
+        self.alarms
+    }
 }

@@ -1,14 +1,14 @@
 //! The figures of the page.
 
-use super::events::{any_fault_intervals, fault_intervals};
+use super::digest::{Curves, Digest, points};
 use super::{RANKING, find, name_of, unit_of, variant_name};
-use crate::figure::{Dash, Figure, Ink, Mark, Point, Series, Weight};
+use crate::decimate::Thinned;
+use crate::figure::{Dash, Figure, Ink, Mark, Series, Weight};
 use crate::style;
 use crate::text::with_unit;
 use ftc_control::parameters::EstimatorMethod;
 use ftc_design::Design;
-use ftc_simulate::closed_loop::Record;
-use ftc_simulate::{Trajectory, Variant};
+use ftc_simulate::Variant;
 
 const TIME: &str = "time (s)";
 const FAULTY: &str = "fault present";
@@ -16,21 +16,21 @@ const FAULTY: &str = "fault present";
 /// The runs of one scenario, and what all figures share.
 pub struct Scene<'a> {
     design: &'a Design,
-    trajectories: &'a [Trajectory],
+    runs: &'a [Digest],
     /// The run whose measurements, estimates and scenario are shown.
-    main: Option<&'a Trajectory>,
+    main: Option<&'a Digest>,
     marks: Vec<Mark>,
 }
 
 impl<'a> Scene<'a> {
     /// Collects the runs.
-    pub fn new(design: &'a Design, trajectories: &'a [Trajectory]) -> Self {
-        let main = find(trajectories, Variant::Ftc)
-            .or(trajectories.first())
-            .filter(|run| !run.records.is_empty());
+    pub fn new(design: &'a Design, runs: &'a [Digest]) -> Self {
+        let main = find(runs, Variant::Ftc)
+            .or(runs.first())
+            .filter(|run| run.samples() > 0);
         let mut scene = Self {
             design,
-            trajectories,
+            runs,
             main,
             marks: Vec::new(),
         };
@@ -41,7 +41,7 @@ impl<'a> Scene<'a> {
     /// One figure per output: the true output of every variant about the reference.
     pub fn outputs(&self) -> Vec<Figure> {
         self.for_each(
-            |record| record.y.len(),
+            |curves| curves.y.len(),
             |run, output| self.output(run, output),
         )
     }
@@ -52,9 +52,9 @@ impl<'a> Scene<'a> {
             return Vec::new();
         };
         let estimates = self.design.controller.estimator.method != EstimatorMethod::None;
-        if estimates || !any_fault_intervals(run).is_empty() {
+        if estimates || !run.any_fault_intervals().is_empty() {
             self.for_each(
-                |record| record.f_hat.len(),
+                |curves| curves.f_hat.len(),
                 |run, sensor| self.fault(run, sensor),
             )
         } else {
@@ -68,23 +68,23 @@ impl<'a> Scene<'a> {
             return Vec::new();
         }
         self.for_each(
-            |record| record.residual.len(),
+            |curves| curves.residual.len(),
             |run, sensor| self.residual(run, sensor),
         )
     }
 
     /// One figure per input: the command of every variant.
     pub fn inputs(&self) -> Vec<Figure> {
-        self.for_each(|record| record.u.len(), |run, input| self.input(run, input))
+        self.for_each(|curves| curves.u.len(), |run, input| self.input(run, input))
     }
 
     /// One figure per disturbance.
     pub fn disturbances(&self) -> Vec<Figure> {
         self.for_each(
-            |record| record.disturbance.len(),
+            |curves| curves.disturbance.len(),
             |run, channel| {
                 let name = format!("w[{}]", channel + 1);
-                let points = self.points(run, |record| record.disturbance[channel]);
+                let points = points(&run.curves().disturbance, channel);
                 Figure::new(
                     format!("disturbance-{}", channel + 1),
                     format!("Disturbance {name}"),
@@ -99,17 +99,17 @@ impl<'a> Scene<'a> {
 
     fn for_each(
         &self,
-        size: impl Fn(&Record) -> usize,
-        make: impl Fn(&Trajectory, usize) -> Figure,
+        size: impl Fn(&Curves) -> usize,
+        make: impl Fn(&Digest, usize) -> Figure,
     ) -> Vec<Figure> {
         self.main.map_or_else(Vec::new, |run| {
-            (0..size(&run.records[0]))
+            (0..size(run.curves()))
                 .map(|index| make(run, index))
                 .collect()
         })
     }
 
-    fn output(&self, run: &Trajectory, output: usize) -> Figure {
+    fn output(&self, run: &Digest, output: usize) -> Figure {
         let outputs = &self.design.signals.outputs;
         let name = name_of(outputs, output, "y");
         let label = with_unit(&name, unit_of(outputs, output));
@@ -119,8 +119,8 @@ impl<'a> Scene<'a> {
             TIME,
             label,
         )
-        .with(style::measured(self.points(run, |record| record.y[output])));
-        for series in self.variants(|record| record.y_true[output]) {
+        .with(style::measured(points(&run.curves().y, output)));
+        for series in self.variants(|curves| &curves.y_true, output) {
             figure = figure.with(series);
         }
         if let Some(row) = self
@@ -131,25 +131,18 @@ impl<'a> Scene<'a> {
             .iter()
             .position(|row| *row == output)
         {
-            let reference = self.points(run, |record| record.reference[row]);
+            let reference = points(&run.curves().reference, row);
             figure = figure.with(style::reference(reference));
         }
         figure
-            .shade(FAULTY, self.times(&fault_intervals(run, output)))
+            .shade(FAULTY, self.times(run.fault_intervals(output)))
             .mark(&self.marks)
     }
 
-    fn fault(&self, run: &Trajectory, sensor: usize) -> Figure {
+    fn fault(&self, run: &Digest, sensor: usize) -> Figure {
         let outputs = &self.design.signals.outputs;
         let name = name_of(outputs, sensor, "y");
-        // A sensor that gives no number has no additive fault to draw.
-        let truth = self.points(run, |record| {
-            if record.y[sensor].is_finite() {
-                record.fault[sensor]
-            } else {
-                f64::NAN
-            }
-        });
+        let truth = points(&run.curves().fault, sensor);
         Figure::new(
             format!("fault-{}", sensor + 1),
             format!("Fault of sensor {name}"),
@@ -157,12 +150,12 @@ impl<'a> Scene<'a> {
             with_unit(&format!("fault of {name}"), unit_of(outputs, sensor)),
         )
         .with(style::true_fault(truth))
-        .with(Series::new("estimate", self.points(run, |record| record.f_hat[sensor])).step())
-        .shade(FAULTY, self.times(&fault_intervals(run, sensor)))
+        .with(Series::new("estimate", points(&run.curves().f_hat, sensor)).step())
+        .shade(FAULTY, self.times(run.fault_intervals(sensor)))
         .mark(&self.marks)
     }
 
-    fn residual(&self, run: &Trajectory, sensor: usize) -> Figure {
+    fn residual(&self, run: &Digest, sensor: usize) -> Figure {
         let outputs = &self.design.signals.outputs;
         let name = name_of(outputs, sensor, "y");
         let mut figure = Figure::new(
@@ -172,17 +165,13 @@ impl<'a> Scene<'a> {
             with_unit(&format!("residual of {name}"), unit_of(outputs, sensor)),
         )
         .with(
-            Series::new(
-                "residual",
-                self.points(run, |record| record.residual[sensor]),
-            )
-            .ink(Ink::Purple)
-            .weight(Weight::Thin)
-            .step(),
+            Series::new("residual", points(&run.curves().residual, sensor))
+                .ink(Ink::Purple)
+                .weight(Weight::Thin)
+                .step(),
         );
         if let Some(&threshold) = self.design.controller.estimator.thresholds.get(sensor) {
-            let until = self.time(run.records[run.records.len() - 1].tick);
-            let from = self.time(run.records[0].tick);
+            let (from, until) = (0.0, self.time(run.samples() - 1));
             let level = |name: String, value| {
                 Series::new(name, vec![[from, value], [until, value]])
                     .ink(Ink::Vermilion)
@@ -195,11 +184,11 @@ impl<'a> Scene<'a> {
                 .with(level(String::new(), -threshold));
         }
         figure
-            .shade(FAULTY, self.times(&fault_intervals(run, sensor)))
+            .shade(FAULTY, self.times(run.fault_intervals(sensor)))
             .mark(&self.marks)
     }
 
-    fn input(&self, run: &Trajectory, input: usize) -> Figure {
+    fn input(&self, run: &Digest, input: usize) -> Figure {
         let inputs = &self.design.signals.inputs;
         let name = name_of(inputs, input, "u");
         let label = with_unit(&name, unit_of(inputs, input));
@@ -209,31 +198,24 @@ impl<'a> Scene<'a> {
             TIME,
             label,
         );
-        for series in self.variants(|record| record.u[input]) {
+        for series in self.variants(|curves| &curves.u, input) {
             figure = figure.with(series.step());
         }
         figure
-            .shade("a sensor is faulty", self.times(&any_fault_intervals(run)))
+            .shade("a sensor is faulty", self.times(run.any_fault_intervals()))
             .mark(&self.marks)
     }
 
     /// A signal of every variant, each in the variant's own look; the one this is about on top.
-    fn variants(&self, signal: impl Fn(&Record) -> f64) -> Vec<Series> {
+    fn variants(&self, signal: impl Fn(&Curves) -> &[Thinned], index: usize) -> Vec<Series> {
         RANKING
             .into_iter()
             .rev()
-            .filter_map(|variant| find(self.trajectories, variant))
+            .filter_map(|variant| find(self.runs, variant))
             .map(|run| {
-                let points = self.points(run, &signal);
+                let points = points(signal(run.curves()), index);
                 style::variant(variant_name(run.variant), run.variant, points)
             })
-            .collect()
-    }
-
-    fn points(&self, run: &Trajectory, signal: impl Fn(&Record) -> f64) -> Vec<Point> {
-        run.records
-            .iter()
-            .map(|record| [self.time(record.tick), signal(record)])
             .collect()
     }
 
@@ -254,13 +236,10 @@ impl<'a> Scene<'a> {
             return Vec::new();
         };
         let modes = &self.design.plant.modes;
-        run.records
-            .windows(2)
-            .filter(|pair| pair[0].mode != pair[1].mode)
-            .map(|pair| Mark {
-                at: self.time(pair[1].tick),
-                label: super::mode_name(modes, pair[1].mode),
-            })
-            .collect()
+        let mark = |&(tick, mode): &(u64, usize)| Mark {
+            at: self.time(tick),
+            label: super::mode_name(modes, mode),
+        };
+        run.switches().iter().map(mark).collect()
     }
 }

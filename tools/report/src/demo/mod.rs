@@ -1,5 +1,6 @@
 //! The page of one design: what happened in its scenario, with and without fault tolerance.
 
+mod digest;
 pub mod events;
 mod figures;
 mod tables;
@@ -8,24 +9,24 @@ use crate::page::{Block, KeyNumber, Page, Section};
 use crate::summary;
 use crate::svg;
 use crate::text::{self, count, list, number};
-use events::Alarms;
+pub use digest::Digest;
 pub use figures::Scene;
 use ftc_design::{Design, Signal};
 use ftc_plant::Mode;
-use ftc_simulate::{Trajectory, Variant};
+use ftc_simulate::Variant;
 
 /// The page of a simulated design as `report.html`, and each of its figures as `KEY.svg`: name and
 /// contents of every file.
 ///
-/// The trajectories may be any of the variants, in any order; what is missing is left out.
+/// The runs may be of any of the variants, in any order; what is missing is left out.
 /// `warnings` are sentences that stand first.
 pub fn files(
     design: &Design,
-    trajectories: &[Trajectory],
+    runs: &[Digest],
     warnings: &[String],
     robustness: Section,
 ) -> Vec<(String, String)> {
-    let mut page = page(design, trajectories, warnings);
+    let mut page = page(design, runs, warnings);
     let merits = page
         .sections
         .iter()
@@ -63,8 +64,8 @@ fn variant_name(variant: Variant) -> &'static str {
     }
 }
 
-fn find(trajectories: &[Trajectory], variant: Variant) -> Option<&Trajectory> {
-    trajectories.iter().find(|run| run.variant == variant)
+fn find(runs: &[Digest], variant: Variant) -> Option<&Digest> {
+    runs.iter().find(|run| run.variant == variant)
 }
 
 /// The description of signal `index`, or `symbol[index + 1]` where the design describes none.
@@ -95,8 +96,8 @@ fn unit_of(signals: &[Signal], index: usize) -> Option<&str> {
 }
 
 /// The whole page.
-pub fn page(design: &Design, trajectories: &[Trajectory], warnings: &[String]) -> Page {
-    let scene = Scene::new(design, trajectories);
+pub fn page(design: &Design, runs: &[Digest], warnings: &[String]) -> Page {
+    let scene = Scene::new(design, runs);
     let mut sections = Vec::new();
     if !warnings.is_empty() {
         let section = Section::new("Warnings");
@@ -110,8 +111,8 @@ pub fn page(design: &Design, trajectories: &[Trajectory], warnings: &[String]) -
             )
             .figures(scene.outputs()),
         Section::new(MERITS)
-            .with(Block::Table(tables::merits(design, trajectories)))
-            .with(Block::Table(tables::variants(trajectories))),
+            .with(Block::Table(tables::merits(design, runs)))
+            .with(Block::Table(tables::variants(runs))),
     ]);
     let faults = scene.faults();
     if !faults.is_empty() {
@@ -140,8 +141,8 @@ pub fn page(design: &Design, trajectories: &[Trajectory], warnings: &[String]) -
     );
     Page {
         title: format!("{}: fault-tolerant control, simulated", design.name),
-        lead: lead(design, trajectories),
-        key_numbers: key_numbers(design, trajectories),
+        lead: lead(design, runs),
+        key_numbers: key_numbers(design, runs),
         sections,
         footer: format!(
             "Made by ftc-fmu {} from the design “{}”. The figures lie beside this page as SVG files.",
@@ -152,22 +153,22 @@ pub fn page(design: &Design, trajectories: &[Trajectory], warnings: &[String]) -
 }
 
 /// What happened, in a few sentences.
-fn lead(design: &Design, trajectories: &[Trajectory]) -> String {
+fn lead(design: &Design, runs: &[Digest]) -> String {
     let plant = &design.plant;
-    let Some(run) = find(trajectories, Variant::Ftc).or(trajectories.first()) else {
+    let Some(run) = find(runs, Variant::Ftc).or(runs.first()) else {
         return "Nothing was simulated.".into();
     };
     let te = plant.sample_time;
-    let samples = run.records.len();
+    let samples = run.samples();
     let mut sentences = vec![format!(
         "The loop ran for {} s ({} of {} s) through {}.",
         number(samples as f64 * te),
-        count(samples, "sample"),
+        count(samples as usize, "sample"),
         number(te),
-        count(events::modes_visited(run), "mode")
+        count(run.modes_visited(), "mode")
     )];
     let faulty: Vec<String> = (0..plant.dimensions().outputs)
-        .filter(|sensor| !events::fault_intervals(run, *sensor).is_empty())
+        .filter(|sensor| !run.fault_intervals(*sensor).is_empty())
         .map(|sensor| name_of(&design.signals.outputs, sensor, "y"))
         .collect();
     if faulty.is_empty() {
@@ -183,7 +184,7 @@ fn lead(design: &Design, trajectories: &[Trajectory]) -> String {
         "During part of it, the {noun} {} did not tell the truth.",
         list(&faulty)
     ));
-    if let Some((without, against_told)) = ratios(design, trajectories) {
+    if let Some((without, against_told)) = ratios(design, runs) {
         sentences.push(format!(
             "With fault-tolerant control (FTC) the mean square error of the true outputs behind these sensors was {}, and \
              {} a controller that was told the true fault.",
@@ -196,17 +197,17 @@ fn lead(design: &Design, trajectories: &[Trajectory]) -> String {
 
 /// Smallest `MSE without FTC / MSE with FTC` and largest `MSE with FTC / MSE told the fault` over
 /// the tracked outputs whose own sensor fails (over all tracked ones if none of these does), true signals.
-fn ratios(design: &Design, trajectories: &[Trajectory]) -> Option<(f64, f64)> {
+fn ratios(design: &Design, runs: &[Digest]) -> Option<(f64, f64)> {
     let tracked = &design.controller.feedback.tracked;
-    let ftc = find(trajectories, Variant::Ftc)?;
+    let ftc = find(runs, Variant::Ftc)?;
     let mut outputs: Vec<usize> = (0..tracked.len())
-        .filter(|index| !events::fault_intervals(ftc, tracked[*index]).is_empty())
+        .filter(|index| !ftc.fault_intervals(tracked[*index]).is_empty())
         .collect();
     if outputs.is_empty() {
         outputs = (0..tracked.len()).collect();
     }
     let errors = |variant| -> Option<Vec<f64>> {
-        let merits = find(trajectories, variant)?.merits(tracked);
+        let merits = find(runs, variant)?.merits();
         Some(
             outputs
                 .iter()
@@ -270,13 +271,13 @@ fn rounded(value: f64) -> String {
     }
 }
 
-fn key_numbers(design: &Design, trajectories: &[Trajectory]) -> Vec<KeyNumber> {
+fn key_numbers(design: &Design, runs: &[Digest]) -> Vec<KeyNumber> {
     let key = |value: String, meaning: &str| KeyNumber {
         value,
         meaning: meaning.into(),
     };
     let mut keys = Vec::new();
-    if let Some((without, against_told)) = ratios(design, trajectories) {
+    if let Some((without, against_told)) = ratios(design, runs) {
         keys.push(key(
             format!("{} ×", rounded(without)),
             "as large a true mean square error without FTC, at least",
@@ -286,8 +287,8 @@ fn key_numbers(design: &Design, trajectories: &[Trajectory]) -> Vec<KeyNumber> {
             "the true mean square error of a controller told the fault, at most",
         ));
     }
-    if let Some(run) = find(trajectories, Variant::Ftc) {
-        let alarms = Alarms::of(run);
+    if let Some(run) = find(runs, Variant::Ftc) {
+        let alarms = run.alarms();
         if alarms.onsets > 0 {
             keys.push(key(
                 format!("{} of {}", alarms.found, alarms.onsets),

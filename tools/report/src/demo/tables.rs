@@ -1,19 +1,20 @@
 //! The tables of the page.
 
+use super::digest::Digest;
 use super::{RANKING, find, name_of, unit_of, variant_name};
 use crate::page::{Column, Row, Table};
 use crate::text::{aligned, number, significant, with_unit};
 use ftc_control::parameters::EstimatorMethod;
 use ftc_design::Design;
-use ftc_simulate::{Trajectory, Variant};
+use ftc_simulate::Variant;
 
 /// MSE and VAF per tracked output and variant, true and measured.
-pub fn merits(design: &Design, trajectories: &[Trajectory]) -> Table {
+pub fn merits(design: &Design, digests: &[Digest]) -> Table {
     let tracked = &design.controller.feedback.tracked;
     let runs: Vec<_> = RANKING
         .into_iter()
-        .filter_map(|variant| find(trajectories, variant))
-        .map(|run| (run.variant, run.merits(tracked)))
+        .filter_map(|variant| find(digests, variant))
+        .map(|run| (run.variant, run.merits()))
         .collect();
     let mut rows = Vec::new();
     for (index, &output) in tracked.iter().enumerate() {
@@ -59,10 +60,10 @@ pub fn merits(design: &Design, trajectories: &[Trajectory]) -> Table {
 }
 
 /// What each variant is.
-pub fn variants(trajectories: &[Trajectory]) -> Table {
+pub fn variants(digests: &[Digest]) -> Table {
     let rows = RANKING
         .into_iter()
-        .filter(|variant| find(trajectories, *variant).is_some())
+        .filter(|variant| find(digests, *variant).is_some())
         .map(|variant| Row {
             cells: vec![variant_name(variant).into(), explanation(variant).into()],
             emphasised: variant == Variant::Ftc,

@@ -61,6 +61,10 @@ fn dense(dataset: &Dataset) -> Result<DMatrix<f64>, EntryError> {
         .map(|size| usize::try_from(size).unwrap_or(usize::MAX))
         .collect();
     shape.reverse();
+    if shape.is_empty() {
+        // A number by itself.
+        shape = vec![1, 1];
+    }
     check_shape(&shape)?;
     from_columns(&shape, &dataset.read_f64().map_err(not_real)?)
 }

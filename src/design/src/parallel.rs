@@ -1,0 +1,35 @@
+//! Independent parts of a design, worked on at the same time inside a pool of threads.
+
+#[cfg(feature = "solver")]
+use rayon::prelude::*;
+
+/// What `find` makes of every item, in their order. Called inside a pool of threads (`rayon`), it works on
+/// several at the same time; what comes back is the same to the bit.
+pub(crate) fn each<T: Sync, R: Send>(items: &[T], find: impl Fn(&T) -> R + Sync + Send) -> Vec<R> {
+    #[cfg(feature = "solver")]
+    if rayon::current_thread_index().is_some() {
+        return items.par_iter().map(find).collect();
+    }
+    items.iter().map(find).collect()
+}
+
+/// As [`each`], but the first error in the order of the items where there is one. Outside a pool nothing is
+/// worked on after it.
+pub(crate) fn all<T: Sync, R: Send, E: Send>(
+    items: &[T],
+    find: impl Fn(&T) -> Result<R, E> + Sync + Send,
+) -> Result<Vec<R>, E> {
+    #[cfg(feature = "solver")]
+    if rayon::current_thread_index().is_some() {
+        return each(items, find).into_iter().collect();
+    }
+    items.iter().map(find).collect()
+}
+
+/// [`all`] for what may be missing.
+pub(crate) fn every<T: Sync, R: Send>(
+    items: &[T],
+    find: impl Fn(&T) -> Option<R> + Sync + Send,
+) -> Option<Vec<R>> {
+    all(items, |item| find(item).ok_or(())).ok()
+}
