@@ -25,6 +25,7 @@ if TYPE_CHECKING:
 
 
 def test_examples_come_with_the_package(tmp_path: Path) -> None:
+    """Every example is written whole; a design file loads, a script starts."""
     assert {"paper", "logged", "quadruple_tank", "from_a_log"} <= set(ftc.examples())
     for name in ftc.examples():
         start = ftc.example(name, tmp_path / name)
@@ -39,6 +40,7 @@ def test_examples_come_with_the_package(tmp_path: Path) -> None:
 
 
 def test_threads_do_not_change_a_design(tmp_path: Path) -> None:
+    """Modes under `dwell` solved in three threads are those solved in one."""
     path = ftc.example("paper", tmp_path)
     text = path.read_text(encoding="utf-8")
     path.write_text(text.replace('lyapunov = "common"', 'lyapunov = "dwell"'), encoding="utf-8")
