@@ -15,8 +15,11 @@ TOOLS := $(CURDIR)/target/tools
 
 # The program, and the FMU binaries by themselves with the profile meant for them: built with the
 # whole workspace they would carry the solver's symbols along. No path of this machine is in them.
+# PROGRAM may say more than the program alone, as `.ci/run` does.
+PROGRAM ?= --package ftc-fmu
+
 build:
-	cargo build --release --package ftc-fmu
+	cargo build --release $(PROGRAM)
 	CARGO_ENCODED_RUSTFLAGS="$$(tools/platforms/remap.sh)" \
 		cargo build --profile fmu --package ftc-controller-fmu --package ftc-plant-fmu
 	tools/platforms/native.sh
@@ -60,9 +63,9 @@ test: lint package test-rust test-python
 test-rust: build
 	cargo test --release --workspace --exclude ftc-python
 
-# PYTEST may hold options, such as --nothing-skipped.
+# As many at a time as there are cores. PYTEST may hold options, such as --nothing-skipped.
 test-python: build $(VENV)/ready
-	$(IN_VENV)python -m pytest $(PYTEST)
+	$(IN_VENV)python -m pytest --numprocesses auto --dist worksteal $(PYTEST)
 
 # Every kind of page the program writes, opened in a headless Chromium, which is installed where there
 # is none. Pictures of what was seen are left in out/browser/seen.
@@ -82,8 +85,17 @@ browser: build
 		$(BROWSER)/campaign/campaign.html $(BROWSER)/tank/report.html $(BROWSER)/reproduce/paper.html $(BROWSER)/reproduce/converter.html \
 		$(BROWSER)/controller/documentation/index.html $(BROWSER)/plant/documentation/index.html
 
-demo: build $(VENV)/ready
-	PYTHONPATH=tests/support $(IN_VENV)python tests/fmpy/demo.py examples/paper.toml out/demo
+# FMPy alone: all that the tests need would take longer to install than the demonstration to run.
+DEMO := target/demo
+
+demo: build $(DEMO)/ready
+	PYTHONPATH=tests/support $(DEMO)/bin/python tests/fmpy/demo.py examples/paper.toml out/demo
+
+$(DEMO)/ready: tests/requirements.txt
+	rm -rf $(DEMO)
+	$(PYTHON) -m venv $(DEMO)
+	$(DEMO)/bin/pip install --quiet --disable-pip-version-check --no-compile --constraint tests/requirements.txt FMPy numpy
+	touch $@
 
 bench: build $(VENV)/ready
 	cargo bench --workspace
@@ -104,7 +116,7 @@ fuzz: $(TOOLS)/$(FUZZER)
 		-max_total_time=$(SECONDS) -rss_limit_mb=4096 -print_final_stats=1'
 
 $(TOOLS)/$(FUZZER):
-	cargo install --quiet --locked --root $(TOOLS) $(FUZZER)
+	cargo install --quiet --locked --debug --root $(TOOLS) $(FUZZER)
 	touch $@
 
 TICKS ?= 100000000
@@ -139,15 +151,16 @@ LIBRARIES := ftc-plant ftc-control ftc-lapack ftc-design ftc-simulate ftc-identi
 package:
 	rm -rf target/packaged
 	rm -rf $(LIBRARIES:%="$${CARGO_HOME:-$$HOME/.cargo}"/registry/src/-*/%-[0-9]*)
-	cargo package --quiet --allow-dirty --target-dir target/packaged $(LIBRARIES:%=--package %)
+	CARGO_PROFILE_DEV_DEBUG=0 cargo package --quiet --allow-dirty --target-dir target/packaged $(LIBRARIES:%=--package %)
 
 clean:
 	cargo clean
 	rm -rf out $(VENV)
 
-# Made anew whenever the requirements change, so that nothing is left of the old ones.
+# Made anew whenever the requirements change, so that nothing is left of the old ones. Python compiles
+# what is used of them when it is used.
 $(VENV)/ready: tests/requirements.txt
 	rm -rf $(VENV)
 	$(PYTHON) -m venv $(VENV)
-	$(IN_VENV)pip install --quiet --disable-pip-version-check --requirement tests/requirements.txt
+	$(IN_VENV)pip install --quiet --disable-pip-version-check --no-compile --requirement tests/requirements.txt
 	touch $@

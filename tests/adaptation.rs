@@ -6,7 +6,7 @@ mod adapting;
 mod random_plants;
 
 use adapting::{
-    STEPS, change_gains, changed_plant, errors, play, ratio, scale_thresholds, tolerates,
+    STEPS, change_gains, changed_plant, errors, ratio, scale_thresholds, simulate, tolerates,
     with_faults,
 };
 use ftc_simulate::Variant;
@@ -55,7 +55,7 @@ fn a_plant_that_changed_is_predicted_better() {
             continue;
         }
         let [adapted, fixed] = [true, false].map(|adapt| {
-            let run = play(&design, adapt, Variant::Ftc);
+            let run = simulate(&design, adapt, Variant::Ftc);
             let later = &run.records[STEPS as usize / 2..];
             let residuals = later.iter().flat_map(|r| &r.residual);
             (residuals.map(|r| r * r).sum::<f64>() / later.len() as f64).sqrt()

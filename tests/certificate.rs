@@ -104,8 +104,8 @@ fn damage_is_refused() {
 #[test]
 fn a_dwell_time_that_is_too_short_is_refused() {
     let (plant, synthesis) = designed(Lyapunov::Dwell, 1);
-    let honest = synthesis.state_feedback.dwell.unwrap();
-    assert!(honest.mu > 1.01);
+    let proved = synthesis.state_feedback.dwell.unwrap();
+    assert!(proved.mu > 1.01);
     let mut shorter = synthesis.clone();
     shorter.state_feedback.dwell.as_mut().unwrap().samples *= 0.99;
     assert!(matches!(

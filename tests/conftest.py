@@ -36,7 +36,8 @@ def pytest_addoption(parser: pytest.Parser) -> None:
 def pytest_sessionfinish(session: pytest.Session) -> None:
     """Ends with an error if a test was skipped and none may be."""
     reporter = session.config.pluginmanager.get_plugin("terminalreporter")
-    if session.config.getoption("nothing_skipped") and reporter.stats.get("skipped"):
+    # A worker of several reports to the process that started it.
+    if reporter and session.config.getoption("nothing_skipped") and reporter.stats.get("skipped"):
         session.exitstatus = pytest.ExitCode.TESTS_FAILED
 
 

@@ -77,6 +77,7 @@ fn outside(name: &str, input: &str) -> String {
         .args(["run", "--quiet", "--manifest-path"])
         .arg(root().join(format!("tests/outside/{name}/Cargo.toml")))
         .env("CARGO_TARGET_DIR", target)
+        .env("CARGO_PROFILE_DEV_DEBUG", "0")
         .stdin(Stdio::piped())
         .stdout(Stdio::piped())
         .spawn()

@@ -249,12 +249,9 @@ fn compare(simulator: &PlantSimulator, u: [f64; 2], mode: Option<usize>, step: f
             let at = |size: f64, state: &PlantState, whole: bool, derive: bool| {
                 let scaled = direction.map(|d| size * d);
                 let base = if derive { [0.0; 5] } else { scaled };
-                let external = External {
-                    fault: &[0.1 + base[2], base[3]],
-                    disturbance: &[0.05 + base[4]],
-                    mode,
-                    noise: true,
-                };
+                let fault = [0.1 + base[2], base[3]];
+                let disturbance = [0.05 + base[4]];
+                let external = External::new(&fault, &disturbance).in_mode(mode);
                 let u = [u[0] + base[0], u[1] + base[1]];
                 let change = Change {
                     command: &direction[..2],
@@ -295,12 +292,7 @@ fn compare(simulator: &PlantSimulator, u: [f64; 2], mode: Option<usize>, step: f
                 }
             }
         }
-        let external = External {
-            fault: &[0.1, 0.0],
-            disturbance: &[0.05],
-            mode,
-            noise: true,
-        };
+        let external = External::new(&[0.1, 0.0], &[0.05]).in_mode(mode);
         simulator.observe(&mut state, &external);
         simulator.advance(&mut state, &u).unwrap();
     }

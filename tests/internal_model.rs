@@ -161,10 +161,10 @@ fn the_certificate_belongs_to_the_angle() {
     let text = serde_json::to_string(&design).unwrap();
     assert_eq!(design, serde_json::from_str(&text).unwrap());
     design.verify(&plant).unwrap();
-    let honest = design.clone();
+    let original = design.clone();
     design.spec.resonators[0] = 2.0 * ANGLE;
     design.verify(&plant).unwrap_err();
-    design = honest;
+    design = original;
     design.spec.resonators.clear();
     design.verify(&plant).unwrap_err();
 }

@@ -10,21 +10,15 @@ use ftc_simulate::baselines::predictive::{Predictive, PredictiveSpec};
 use ftc_simulate::{PlantSimulator, Trajectory, Variant, run_with};
 
 fn spec(limit: f64) -> PredictiveSpec {
-    PredictiveSpec {
-        tracked: vec![0, 1],
-        output_weight: vec![1.0; 2],
-        input_weight: vec![0.1; 2],
-        limits: vec![
-            Limits {
-                min: Some(-limit),
-                max: Some(limit)
-            };
-            2
-        ],
-        noise: vec![0.01; 2],
-        disturbance: vec![0.04],
-        horizon: 20,
+    let mut spec = PredictiveSpec::new(&plant(Channel::State), vec![0, 1], vec![0.01; 2]);
+    for limits in &mut spec.limits {
+        *limits = Limits {
+            min: Some(-limit),
+            max: Some(limit),
+        };
     }
+    spec.disturbance = vec![0.04];
+    spec
 }
 
 fn simulate(limit: f64, fault: Waveform, offset: f64) -> Trajectory {

@@ -15,7 +15,7 @@ use ftc_simulate::{PlantSimulator, Trajectory, Variant, run};
 const STEPS: u64 = 3000;
 
 /// The paper's example on steps, with one fault on the first sensor.
-fn play(
+fn simulate(
     parameters: &ControllerParameters,
     kind: FaultKind,
     from: f64,
@@ -69,8 +69,8 @@ fn a_fault_from_the_first_sample_on_is_survived() {
     for parameters in designs() {
         for kind in kinds {
             for until in [60.0, 100.0, 700.0] {
-                let tolerant = play(&parameters, kind, 0.0, until, Variant::Ftc);
-                let told = play(&parameters, kind, 0.0, until, Variant::ToldTheFault);
+                let tolerant = simulate(&parameters, kind, 0.0, until, Variant::Ftc);
+                let told = simulate(&parameters, kind, 0.0, until, Variant::ToldTheFault);
                 // The last mode is entered at 800; the error there is that of the reference.
                 let (ours, least) = (error(&tolerant, 2000), error(&told, 2000));
                 assert!(
@@ -90,7 +90,7 @@ fn a_known_disturbance_hides_no_larger_bias() {
     let [_, known] = designs();
     let bias = FaultKind::Bias { size: 0.8 };
     let first = 10.0 + known.estimator.response_length as f64;
-    let run = play(&known, bias, first, 700.0, Variant::Ftc);
+    let run = simulate(&known, bias, first, 700.0, Variant::Ftc);
     let seen = run.records.iter().position(|record| record.flagged[0]);
     let seen = seen.expect("the bias is seen");
     assert!(
@@ -103,8 +103,8 @@ fn a_known_disturbance_hides_no_larger_bias() {
 #[test]
 fn a_stuck_sensor_is_carried_across_a_switch() {
     for parameters in designs() {
-        let silent = play(&parameters, FaultKind::Dropout, 690.0, 900.0, Variant::Ftc);
-        let stuck = play(&parameters, FaultKind::Stuck, 690.0, 900.0, Variant::Ftc);
+        let silent = simulate(&parameters, FaultKind::Dropout, 690.0, 900.0, Variant::Ftc);
+        let stuck = simulate(&parameters, FaultKind::Stuck, 690.0, 900.0, Variant::Ftc);
         assert!(
             stuck.records[790].flagged[0],
             "not accused before the switch"

@@ -11,6 +11,7 @@ pub const DESIGN_FILE: &str = "design.msgpack";
 #[non_exhaustive]
 pub enum DesignFileError {
     /// The writer fails.
+    #[cfg(feature = "write")]
     #[error(transparent)]
     Write(#[from] rmp_serde::encode::Error),
     /// The bytes are no record of a design.
@@ -25,6 +26,7 @@ pub enum DesignFileError {
 ///
 /// # Errors
 /// What the writer says.
+#[cfg(feature = "write")]
 pub fn write_design(design: &Design) -> Result<Vec<u8>, DesignFileError> {
     let mut running = design.clone();
     running.proof = None;

@@ -23,7 +23,9 @@ mod variable;
 #[cfg(feature = "xml")]
 pub mod xml;
 
-pub use design::{DESIGN_FILE, DesignFileError, read_design, write_design};
+#[cfg(feature = "write")]
+pub use design::write_design;
+pub use design::{DESIGN_FILE, DesignFileError, read_design};
 pub use guid::{CONTROLLER, PLANT, guid};
 pub use interface::{Interface, SignalInfo, controller, plant};
 pub use table::{Span, VariableTable};

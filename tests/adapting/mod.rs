@@ -48,7 +48,7 @@ pub fn with_faults(design: &mut Design, dice: &mut Dice) {
 }
 
 /// The loop's run with or without adaptation.
-pub fn play(design: &Design, adapt: bool, variant: Variant) -> Trajectory {
+pub fn simulate(design: &Design, adapt: bool, variant: Variant) -> Trajectory {
     let mut parameters = design.parameters();
     parameters.estimator.adapt = adapt;
     let plant = PlantSimulator::with_true_plant(
@@ -71,7 +71,7 @@ const LOST: f64 = 1e3;
 /// The true error with adaptation and without; none where an output is lost.
 pub fn errors(design: &Design) -> [Option<f64>; 2] {
     [true, false].map(|adapt| {
-        let run = play(design, adapt, Variant::Ftc);
+        let run = simulate(design, adapt, Variant::Ftc);
         let mut outputs = run.records.iter().flat_map(|r| &r.y_true);
         outputs.all(|y| y.abs() < LOST).then(|| error(design, &run))
     })
@@ -99,7 +99,7 @@ pub fn tolerates(design: &Design) -> bool {
     let mut unchanged = design.clone();
     unchanged.true_plant = TruePlant::AsDesigned;
     let [changed, before] = [design, &unchanged]
-        .map(|design| error(design, &play(design, false, Variant::ToldTheFault)));
+        .map(|design| error(design, &simulate(design, false, Variant::ToldTheFault)));
     changed < 1.2 * before
 }
 

@@ -31,4 +31,4 @@ for example in quadruple_tank dc_motor boost_converter; do
     python "examples/python/$example.py" --out "$folder/$example" --runs 100
 done
 python examples/python/from_a_log.py --out "$folder/from_a_log"
-FTC_FMU=$PWD/$environment/bin/ftc-fmu python -m pytest tests
+FTC_FMU=$PWD/$environment/bin/ftc-fmu python -m pytest --numprocesses auto --dist worksteal tests

@@ -1,7 +1,7 @@
 //! The slave that proves the interface: it adds up its inputs, once per tick.
 //!
 //! `late` is published when a tick ends, as a plant does it; `early` when it begins, as a
-//! controller does it. Two magic references make it fail, so that failure can be tested:
+//! controller does it. Two values of its reference make it fail, so that failure can be tested:
 //! [`PANIC`] and [`FAIL`].
 
 use fmu_abi::clock::Event;

@@ -11,7 +11,7 @@ use crate::memory::{self, Reserve};
 use crate::snapshot::{Snapshot, StateError};
 use crate::types::{Status, ValueReference};
 use crate::{Readiness, Refusal, Slave, Values};
-use model_description::{Causality, Kind, Variability, Variable, VariableTable};
+use model_description::{Causality, Kind, Variability, Variable};
 
 /// Why a call did not succeed.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -100,9 +100,6 @@ struct Access {
     settable: States,
     /// The range that a parameter must keep to.
     range: Option<(f64, f64)>,
-    /// Past the last of the variables from here on with the same access, which can be read and
-    /// set at one go.
-    end: u32,
 }
 
 impl Access {
@@ -129,25 +126,7 @@ impl Access {
                 _ => States::UNTIL_END,
             },
             range: bound.then_some(range),
-            end: 0,
         }
-    }
-
-    /// The rows of a table.
-    fn all(table: &VariableTable) -> Box<[Self]> {
-        let mut rows: Box<[Self]> = table
-            .iter()
-            .map(|(_, variable)| Self::of(variable))
-            .collect();
-        let mut end = rows.len() as u32;
-        for at in (0..rows.len()).rev() {
-            let next = rows.get(at + 1);
-            if next.is_some_and(|next| Self { end: 0, ..*next } != rows[at]) {
-                end = at as u32 + 1;
-            }
-            rows[at].end = end;
-        }
-        rows
     }
 }
 
@@ -201,7 +180,11 @@ impl<S: Slave> Component<S> {
             logger,
             messages: Vec::new(),
             guid: guid.to_string(),
-            access: Access::all(slave.variables()),
+            access: slave
+                .variables()
+                .iter()
+                .map(|(_, variable)| Access::of(variable))
+                .collect(),
             current: fresh.clone(),
             footprint: footprint + size_of::<Snapshot<S::State>>(),
             trial: fresh.state.clone(),
@@ -291,21 +274,24 @@ impl<S: Slave> Component<S> {
         convert: impl Fn(f64) -> Option<T>,
     ) -> Outcome {
         self.refresh()?;
-        if let Some((first, _)) = self.at_one_go(base, references) {
-            let values = self.current.values.run(first, references.len());
-            for ((slot, &value), &reference) in out.iter_mut().zip(values).zip(references) {
-                *slot = convert(value).ok_or_else(|| self.not_of(base, reference, value))?;
+        if !self.all(references, |access| access.base == base) {
+            for &reference in references {
+                self.access(reference, base)?;
             }
-            return Ok(());
-        }
-        for &reference in references {
-            self.access(reference, base)?;
         }
         for (&reference, slot) in references.iter().zip(out) {
             let value = self.current.values.at(reference).unwrap_or_default();
             *slot = convert(value).ok_or_else(|| self.not_of(base, reference, value))?;
         }
         Ok(())
+    }
+
+    /// Whether all of these variables exist and pass the test.
+    #[inline]
+    fn all(&self, references: &[ValueReference], test: impl Fn(&Access) -> bool) -> bool {
+        references
+            .iter()
+            .all(|&reference| self.access.get(reference as usize).is_some_and(&test))
     }
 
     /// Sets values of one type; nothing is set from a call with one bad entry.
@@ -317,23 +303,27 @@ impl<S: Slave> Component<S> {
         convert: impl Fn(T) -> f64,
     ) -> Outcome {
         let phase = self.phase();
-        match self.at_one_go(base, references) {
-            Some((first, access)) if access.range.is_none() && access.settable.contain(phase) => {
-                let slots = self.current.values.run_mut(first, references.len());
-                for (slot, &value) in slots.iter_mut().zip(values) {
-                    *slot = convert(value);
-                }
-                self.current.handed_over |= access.causality == Causality::Input;
+        let free = |access: &Access| {
+            access.base == base && access.range.is_none() && access.settable.contain(phase)
+        };
+        if !self.all(references, free) {
+            self.check_each(base, references, values, &convert)?;
+        }
+        for (&reference, &value) in references.iter().zip(values) {
+            if let Some(slot) = self.current.values.slot(reference) {
+                *slot = convert(value);
             }
-            _ => self.write_each(base, references, values, convert)?,
+            let access = self.access.get(reference as usize);
+            self.current.handed_over |=
+                access.is_some_and(|access| access.causality == Causality::Input);
         }
         self.current.stale = phase == State::InitializationMode;
         Ok(())
     }
 
-    /// The same for variables that are not all alike, one after the other.
-    fn write_each<T: Copy>(
-        &mut self,
+    /// Whether each of these values may be set.
+    fn check_each<T: Copy>(
+        &self,
         base: Base,
         references: &[ValueReference],
         values: &[T],
@@ -354,31 +344,7 @@ impl<S: Slave> Component<S> {
                 )));
             }
         }
-        for (&reference, &value) in references.iter().zip(values) {
-            let access = self.access(reference, base)?;
-            if let Some(slot) = self.current.values.slot(reference) {
-                *slot = convert(value);
-            }
-            self.current.handed_over |= access.causality == Causality::Input;
-        }
         Ok(())
-    }
-
-    /// The first of variables that lie side by side and are of this type, and what may be done
-    /// with them all.
-    fn at_one_go(
-        &self,
-        base: Base,
-        references: &[ValueReference],
-    ) -> Option<(ValueReference, Access)> {
-        let &first = references.first()?;
-        let access = *self.access.get(first as usize)?;
-        let side_by_side = references
-            .iter()
-            .zip(first..access.end)
-            .all(|(&reference, expected)| reference == expected);
-        let within = references.len() <= (access.end - first) as usize;
-        (access.base == base && within && side_by_side).then_some((first, access))
     }
 
     /// fmi2DoStep: runs the ticks of the step.
@@ -424,10 +390,10 @@ impl<S: Slave> Component<S> {
     /// Checks the inputs that the coming ticks read; says whether the mode is still untold.
     fn prepare(&mut self) -> Result<bool, Failure> {
         let current = &mut self.current;
-        if current.clock.ends_tick() && !current.provisional {
-            self.slave.check_late_inputs(&current.values)?;
-        }
         if !current.clock.begins_tick() {
+            if current.clock.ends_tick() && !current.provisional {
+                self.slave.check_late_inputs(&current.values)?;
+            }
             return Ok(current.provisional);
         }
         match self.slave.check_inputs(&current.values)? {

@@ -8,7 +8,7 @@ use std::sync::Arc;
 /// Position of `logAll`, which stands for every category.
 const ALL: usize = LOG_CATEGORIES.len() - 1;
 
-/// The importer's logger, and which categories it wants to hear.
+/// The importer's logger, and the categories it asked for.
 ///
 /// Warnings, refusals and errors are always handed over: `loggingOn` and the categories switch
 /// events alone. Many importers leave logging off and would else show a status without its

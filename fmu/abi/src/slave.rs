@@ -124,7 +124,7 @@ pub trait Slave: Sized + 'static {
     }
 
     /// The same for the inputs that [`Slave::end_tick`] reads, asked before a step in which a
-    /// tick ends.
+    /// tick ends and none begins; else [`Slave::check_inputs`] answers for them, too.
     fn check_late_inputs(&self, _values: &Values) -> Result<(), Refusal> {
         Ok(())
     }
@@ -213,6 +213,9 @@ pub fn nearest_mode(values: &Values, [integer, real]: [Span; 2], modes: usize) -
 /// Refuses a vector with an element that is NaN or infinite, and names the element.
 pub fn require_finite(table: &VariableTable, values: &Values, span: Span) -> Result<(), Refusal> {
     let elements = values.get(span);
+    if elements.iter().all(|value| value.is_finite()) {
+        return Ok(());
+    }
     match (span.first..)
         .zip(elements)
         .find(|(_, value)| !value.is_finite())

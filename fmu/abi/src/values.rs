@@ -69,18 +69,6 @@ impl Values {
         self.0.fill(value);
     }
 
-    /// `len` values from a value reference on.
-    pub(crate) fn run(&self, first: u32, len: usize) -> &[f64] {
-        let first = first as usize;
-        self.0.get(first..first + len).unwrap_or_default()
-    }
-
-    /// The same, to be written.
-    pub(crate) fn run_mut(&mut self, first: u32, len: usize) -> &mut [f64] {
-        let first = first as usize;
-        self.0.get_mut(first..first + len).unwrap_or_default()
-    }
-
     /// The value behind a value reference.
     pub(crate) fn at(&self, reference: u32) -> Option<f64> {
         self.0.get(reference as usize).copied()

@@ -17,7 +17,7 @@ thread_local! {
         Instance::new(fmu_host::linked!(), &Model::controller(&example())).unwrap();
 }
 
-/// Honest bytes after some ticks.
+/// The bytes of a state as it was saved after some ticks.
 static UNCHANGED: LazyLock<Vec<u8>> = LazyLock::new(|| {
     let model = Model::controller(&example());
     let it = Instance::new(fmu_host::linked!(), &model).unwrap();

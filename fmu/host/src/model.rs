@@ -70,12 +70,7 @@ pub fn native(design: &Design, ticks: usize) -> Vec<(Vec<f64>, Vec<f64>)> {
     let controller = Controller::new(design.parameters()).expect("the example fits its plant");
     let plant = PlantSimulator::new(design.plant.clone(), design.scenario.clone());
     let (mut state, mut seen) = (controller.initial_state(0), plant.initial_state());
-    let external = External {
-        fault: &[0.0; 2],
-        disturbance: &[0.0],
-        mode: None,
-        noise: true,
-    };
+    let external = External::new(&[0.0; 2], &[0.0]);
     let tick = |_| {
         plant.observe(&mut seen, &external);
         let sample = controller

@@ -85,12 +85,11 @@ impl PlantFmu {
     }
 
     fn external<'a>(&self, values: &'a Values) -> External<'a> {
-        External {
-            fault: values.get(self.spans.external_fault),
-            disturbance: values.get(self.spans.external_disturbance),
-            mode: self.external_mode(values),
-            noise: values.flag(self.spans.noise_enabled),
-        }
+        let spans = &self.spans;
+        let fault = values.get(spans.external_fault);
+        External::new(fault, values.get(spans.external_disturbance))
+            .in_mode(self.external_mode(values))
+            .with_noise(values.flag(spans.noise_enabled))
     }
 
     fn injected<'a>(&self, values: &'a Values) -> Injected<'a> {

@@ -13,6 +13,7 @@ use nalgebra::{DMatrix, DVector};
 
 /// Healthy inputs and outputs of one mode, without a gap: row `k` holds `u(k)` (m) and `y(k)` (p).
 #[derive(Clone, Debug, PartialEq)]
+#[non_exhaustive]
 pub struct Database {
     /// Number of the first sample in the log it was taken from; it only tells the phase of a
     /// periodic disturbance between stretches of one log.
@@ -24,6 +25,26 @@ pub struct Database {
 }
 
 impl Database {
+    /// From rows of inputs (samples x m) and as many of outputs (samples x p).
+    ///
+    /// # Errors
+    /// [`CommissioningError::Rows`] where there are more of one than of the other.
+    pub fn new(
+        first: usize,
+        inputs: DMatrix<f64>,
+        outputs: DMatrix<f64>,
+    ) -> Result<Self, CommissioningError> {
+        let rows = [inputs.nrows(), outputs.nrows()];
+        if rows[0] != rows[1] {
+            return Err(CommissioningError::Rows { rows });
+        }
+        Ok(Self {
+            first,
+            inputs,
+            outputs,
+        })
+    }
+
     /// Number of samples.
     pub fn samples(&self) -> usize {
         self.inputs.nrows()
@@ -82,6 +103,12 @@ pub enum CommissioningError {
     /// No input moves.
     #[error("the database excites nothing: every recorded input stays at its operating point")]
     NoExcitation,
+    /// Inputs and outputs are not recorded at the same samples.
+    #[error("the database has {} rows of inputs but {} of outputs: give one of each for every sample", rows[0], rows[1])]
+    Rows {
+        /// Rows of inputs and of outputs.
+        rows: [usize; 2],
+    },
     /// An input is infinite or no number.
     #[error("the database cannot be factorised: its inputs are not finite")]
     NotFinite,

@@ -46,7 +46,7 @@ const TOLERANCE: f64 = 1e-9;
 
 /// Maps of all harmonics, `[from][to][harmonic]`, for a period in samples.
 ///
-/// Empty where the plant knows no disturbance, since then nothing can be said.
+/// Empty where the plant has no disturbance, since then nothing can be said.
 pub fn transfers(plant: &SwitchedPlant, period: f64, count: usize) -> Vec<Vec<Vec<PhasorMap>>> {
     let responses: Option<Vec<Vec<_>>> = plant
         .modes

@@ -33,7 +33,7 @@ pub struct Design {
     /// What the simulated plant really is.
     #[serde(default)]
     pub true_plant: TruePlant,
-    /// The experiment the plant FMU plays.
+    /// The experiment the plant FMU runs.
     pub scenario: Scenario,
     /// What proves the gains; none where they were not made by synthesis.
     #[serde(default, skip_serializing_if = "Option::is_none")]

@@ -4,8 +4,8 @@
 //! feedback and of the observer together prove the loop. It is exponentially stable under every
 //! switching that both allow; where both ask for a dwell time, the larger one is enough.
 //!
-//! **Gains.** What the disturbance does to the performance signal, and what sensor noise and a fault
-//! that nobody noticed do to the true tracking error, are proved of the whole loop, mode by mode, and
+//! **Gains.** What the disturbance does to the performance signal, and what sensor noise and an
+//! undetected fault do to the true tracking error, are proved of the whole loop, mode by mode, and
 //! the first also under arbitrary switching where one Lyapunov function gives it within
 //! [`TOLERANCE`] of what a measured state would.
 
@@ -46,7 +46,7 @@ pub const TOLERANCE: f64 = 0.05;
 #[non_exhaustive]
 pub struct RunningLoop {
     /// l2 gain from the disturbance to the performance signal while a mode lasts, per mode; none
-    /// where the plant knows no disturbance.
+    /// where the plant has no disturbance.
     pub gamma_loop: Option<Vec<f64>>,
     /// Root of the summed mean squares of the true tracking errors under independent white noise of
     /// deviation one on every sensor, per mode.

@@ -58,7 +58,7 @@ pub struct StateFeedback {
     pub modes: Vec<ModeGains>,
     /// Proved bound of the l2 gain from the disturbance to the performance signal while the mode
     /// is active (one number per mode, equal under `common` and `switched`); absent when only
-    /// decay was asked for or the plant knows no disturbance.
+    /// decay was asked for or the plant has no disturbance.
     pub gamma: Option<Vec<f64>>,
     /// Below this, per mode, no gains reach under the same guarantee, as far as the solver can tell
     /// (its dual bound, not proved); zero where it cannot tell.

@@ -41,7 +41,7 @@ fn strides(rows: usize, columns: usize, lead: usize) -> (Dyn, Dyn) {
 ///
 /// # Safety
 /// `data` is valid for reads over the span of `rows` x `columns` with leading dimension
-/// `lead >= max(1, rows)`, and nobody writes it while the view lives.
+/// `lead >= max(1, rows)`, and nothing writes it during the view's lifetime.
 pub(crate) unsafe fn matrix<'a>(
     data: *const f64,
     rows: usize,
@@ -60,7 +60,7 @@ pub(crate) unsafe fn matrix<'a>(
 /// A writable view of a column-major matrix.
 ///
 /// # Safety
-/// As [`matrix`], for reads and writes, and nobody else touches it while the view lives.
+/// As [`matrix`], for reads and writes, and nothing else accesses it during the view's lifetime.
 pub(crate) unsafe fn matrix_mut<'a>(
     data: *mut f64,
     rows: usize,

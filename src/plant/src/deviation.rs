@@ -16,9 +16,9 @@ pub struct Deviation {
     pub input_gain: Vec<f64>,
     /// Samples by which every reading is late.
     pub sensor_delay: usize,
-    /// Loads that come and go while the scenario plays.
+    /// Loads that come and go while the scenario runs.
     pub loads: Vec<Load>,
-    /// Faults of actuators while the scenario plays; `sensor` counts inputs from 0, and an actuator
+    /// Faults of actuators while the scenario runs; `sensor` counts inputs from 0, and an actuator
     /// that drops out gives zero.
     pub actuator_faults: Vec<FaultEvent>,
     /// Samples by which the scenario's mode is told late.

@@ -78,7 +78,7 @@ pub struct Mode {
     /// Output matrix `C` (p x n).
     #[serde(with = "rows")]
     pub c: DMatrix<f64>,
-    /// Disturbance to state, `E` (n x s); zero columns when the plant knows no disturbance.
+    /// Disturbance to state, `E` (n x s); zero columns when the plant has no disturbance.
     #[serde(with = "rows")]
     pub e: DMatrix<f64>,
     /// Disturbance to output, `F` (p x s).

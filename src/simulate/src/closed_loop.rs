@@ -38,7 +38,7 @@ impl Variant {
     }
 }
 
-/// Whatever closes the loop: sees the plant's outputs, gives a command.
+/// What closes the loop: from the plant's outputs to a command.
 pub trait Regulator {
     /// One tick.
     fn tick(&mut self, seen: &PlantState);
@@ -324,12 +324,7 @@ impl<'a> Loop<'a> {
 
     /// Observes the plant and computes a command.
     pub fn tick(&mut self) {
-        let external = External {
-            fault: &self.fault,
-            disturbance: &self.disturbance,
-            mode: None,
-            noise: true,
-        };
+        let external = External::new(&self.fault, &self.disturbance);
         self.plant.observe(&mut self.state, &external);
         self.regulator.tick(&self.state);
     }

@@ -5,11 +5,19 @@
 
 /// Relative and absolute error allowed per step.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
 pub struct Tolerance {
     /// Relative to the state.
     pub relative: f64,
     /// Per state.
     pub absolute: f64,
+}
+
+impl Tolerance {
+    /// The error of a state may be `absolute + relative |x|`.
+    pub const fn new(relative: f64, absolute: f64) -> Self {
+        Self { relative, absolute }
+    }
 }
 
 /// A stage: weights of the slopes before it. Stage times of the Dormand-Prince tableau are not needed: the
@@ -173,10 +181,7 @@ mod tests {
 
     #[test]
     fn an_oscillator_keeps_its_phase() {
-        let tolerance = Tolerance {
-            relative: 1e-9,
-            absolute: 1e-12,
-        };
+        let tolerance = Tolerance::new(1e-9, 1e-12);
         let mut state = [1.0, 0.0];
         for _ in 0..100 {
             advance(&mut state, 0.1, tolerance, |s| [s[1], -s[0]]).unwrap();
@@ -192,24 +197,12 @@ mod tests {
             advance(
                 &mut state,
                 5.0,
-                Tolerance {
-                    relative,
-                    absolute: relative,
-                },
+                Tolerance::new(relative, relative),
                 van_der_pol,
             )
             .unwrap();
             let mut exact = [2.0, 0.0];
-            advance(
-                &mut exact,
-                5.0,
-                Tolerance {
-                    relative: 1e-12,
-                    absolute: 1e-12,
-                },
-                van_der_pol,
-            )
-            .unwrap();
+            advance(&mut exact, 5.0, Tolerance::new(1e-12, 1e-12), van_der_pol).unwrap();
             (state[0] - exact[0]).abs()
         };
         assert!(error(1e-6) < 1e-4);
@@ -230,10 +223,7 @@ mod tests {
     /// `x' = x^2` from 1 is `1 / (1 - t)`: there is nothing after t = 1.
     #[test]
     fn nothing_is_integrated_through_a_singularity() {
-        let tolerance = Tolerance {
-            relative: 1e-9,
-            absolute: 1e-9,
-        };
+        let tolerance = Tolerance::new(1e-9, 1e-9);
         let square = |s: &[f64; 1]| [s[0] * s[0]];
         let mut state = [1.0];
         advance(&mut state, 0.5, tolerance, square).unwrap();
@@ -244,10 +234,7 @@ mod tests {
 
     #[test]
     fn what_is_no_number_is_not_accepted() {
-        let tolerance = Tolerance {
-            relative: 1e-9,
-            absolute: 1e-9,
-        };
+        let tolerance = Tolerance::new(1e-9, 1e-9);
         let mut state = [1.0, 2.0];
         let result = advance(&mut state, 1.0, tolerance, |s| [f64::NAN, s[0]]);
         assert_eq!((result, state), (Err(Stalled), [1.0, 2.0]));

@@ -4,6 +4,7 @@ mod departure;
 mod derivative;
 mod injection;
 mod rectifier;
+mod schedule;
 
 pub use derivative::Change;
 pub use injection::{Injected, LAST_INJECTED_KIND};
@@ -17,6 +18,7 @@ use ftc_plant::TruePlant;
 use ftc_plant::noise;
 use ftc_plant::scenario::{FaultEvent, Scenario};
 use ftc_plant::{Deviation, Mode, SwitchedPlant};
+use schedule::{Schedule, Signal};
 use serde::{Deserialize, Serialize};
 
 /// A plant and its scenario: immutable, shared by any number of [`PlantState`]s.
@@ -26,6 +28,7 @@ pub struct PlantSimulator {
     true_plant: TruePlant,
     deviation: Deviation,
     scenario: Scenario,
+    schedule: Schedule,
     modes: Vec<Dynamics>,
 }
 
@@ -64,6 +67,7 @@ impl Dynamics {
 
 /// Signals added from outside, or in place of the scenario.
 #[derive(Clone, Copy, Debug)]
+#[non_exhaustive]
 pub struct External<'a> {
     /// Fault added to each sensor (p).
     pub fault: &'a [f64],
@@ -73,6 +77,30 @@ pub struct External<'a> {
     pub mode: Option<usize>,
     /// Whether the scenario's measurement noise is on.
     pub noise: bool,
+}
+
+impl<'a> External<'a> {
+    /// A fault (p) and a disturbance (s) beside the scenario's own, with its schedule and its noise.
+    pub fn new(fault: &'a [f64], disturbance: &'a [f64]) -> Self {
+        Self {
+            fault,
+            disturbance,
+            mode: None,
+            noise: true,
+        }
+    }
+
+    /// In this mode (0-based) in place of the scenario, where one is given.
+    #[must_use]
+    pub fn in_mode(self, mode: Option<usize>) -> Self {
+        Self { mode, ..self }
+    }
+
+    /// With the scenario's measurement noise, or without.
+    #[must_use]
+    pub fn with_noise(self, noise: bool) -> Self {
+        Self { noise, ..self }
+    }
 }
 
 /// The plant at one tick, with every signal an outside observer may see.
@@ -96,6 +124,10 @@ pub struct PlantState {
     pub disturbance: Vec<f64>,
     /// Reference `y_ref` (r).
     pub reference: Vec<f64>,
+    /// The scenario's part of the disturbance (s), and the tick for which it and the reference were
+    /// played, if any.
+    waves: Vec<f64>,
+    played: Option<u64>,
     /// Measurement noise (p).
     pub noise: Vec<f64>,
     /// The tick that the noise was drawn for, if any was.
@@ -116,13 +148,14 @@ ftc_control::state!(PlantState {
         fault,
         disturbance,
         reference,
+        waves,
         noise,
         last,
         next,
         departed
     ],
     constants: [],
-    counters: [tick, mode, told, drawn]
+    counters: [tick, mode, told, played, drawn]
 });
 
 impl PlantSimulator {
@@ -141,6 +174,7 @@ impl PlantSimulator {
         let (true_plant, deviation) = true_plant.into_parts();
         Self {
             modes: plant.modes.iter().map(Dynamics::new).collect(),
+            schedule: Schedule::new(&scenario, plant.sample_time),
             plant,
             true_plant,
             deviation,
@@ -185,6 +219,8 @@ impl PlantSimulator {
             fault: vec![0.0; dims.outputs],
             disturbance: vec![0.0; dims.disturbances],
             reference: vec![0.0; self.scenario.reference.len()],
+            waves: vec![0.0; dims.disturbances],
+            played: None,
             noise: vec![0.0; dims.outputs],
             drawn: None,
             last: point.y.clone(),
@@ -202,7 +238,7 @@ impl PlantSimulator {
     pub fn observe(&self, state: &mut PlantState, external: &External<'_>) {
         let te = self.plant.sample_time;
         let tick = state.tick;
-        let scenario = &self.scenario;
+        let schedule = &self.schedule;
         let built_in = external.mode.is_none();
         state.mode = self.active_mode(external, tick);
         state.told = self.told_mode(external, state.mode, tick);
@@ -210,25 +246,32 @@ impl PlantSimulator {
         let Some(mode) = self.modes.get(state.mode) else {
             return;
         };
-        let value = |signal: &ftc_plant::scenario::Waveform| {
+        let value = |signal: &Signal| {
             if built_in { signal.at(tick, te) } else { 0.0 }
         };
-        for (out, signal) in state.reference.iter_mut().zip(&scenario.reference) {
-            *out = value(signal);
+        // A tick is observed twice: when the one before it ends, and when it begins.
+        if state.played != Some(tick) || !built_in {
+            for (out, signal) in state.reference.iter_mut().zip(&schedule.reference) {
+                *out = value(signal);
+            }
+            for (out, signal) in state.waves.iter_mut().zip(&schedule.disturbance) {
+                *out = value(signal);
+            }
+            state.played = built_in.then_some(tick);
         }
-        for ((out, signal), &added) in state
+        for ((out, wave), &added) in state
             .disturbance
             .iter_mut()
-            .zip(&scenario.disturbance)
+            .zip(&state.waves)
             .zip(external.disturbance)
         {
-            *out = kernel::bounded(value(signal) + added);
+            *out = kernel::bounded(wave + added);
         }
         self.load_disturbance(state);
         for ((out, signal), &added) in state
             .fault
             .iter_mut()
-            .zip(&scenario.fault)
+            .zip(&schedule.fault)
             .zip(external.fault)
         {
             *out = value(signal) + added;
@@ -244,7 +287,7 @@ impl PlantSimulator {
     fn active_mode(&self, external: &External<'_>, tick: u64) -> usize {
         external
             .mode
-            .unwrap_or_else(|| self.scenario.mode(tick, self.plant.sample_time))
+            .unwrap_or_else(|| self.schedule.mode(tick))
             .min(self.plant.modes.len().saturating_sub(1))
     }
 
@@ -296,7 +339,6 @@ impl PlantSimulator {
             state.drawn = None;
             return;
         }
-        // A tick is observed twice: when the one before it ends, and when it begins.
         if state.drawn.replace(state.tick) == Some(state.tick) {
             return;
         }
@@ -338,9 +380,11 @@ impl PlantSimulator {
 
     /// The events present at a sensor (0-based) at `tick`; none where `events` are off.
     fn acting(&self, sensor: usize, tick: u64, events: bool) -> impl Iterator<Item = &FaultEvent> {
-        let te = self.plant.sample_time;
-        let all = self.scenario.events.iter();
-        all.filter(move |event| events && event.sensor == sensor && event.active(tick, te))
+        let all = self.schedule.events.iter();
+        let present = all.filter(move |(lasts, event)| {
+            events && event.sensor == sensor && lasts.contains(&tick)
+        });
+        present.map(|(_, event)| event)
     }
 }
 
@@ -395,9 +439,9 @@ mod tests {
         ) {
             let simulator = simulator();
             let [x, y, y_true, fault, disturbance, reference, noise, last, next] = sizes.map(|size| vec![1.0; size]);
-            let mut state = PlantState { tick: 3, mode, x, y, y_true, fault, disturbance, reference, noise, last, next, told: mode, drawn: None, departed: Departed::default() };
+            let mut state = PlantState { tick: 3, mode, x, y, y_true, fault, waves: disturbance.clone(), disturbance, reference, played: None, noise, last, next, told: mode, drawn: None, departed: Departed::default() };
             let (u, f, w) = (vec![1.0; m], vec![1.0; p], vec![1.0; s]);
-            let external = External { fault: &f, disturbance: &w, mode: given, noise: true };
+            let external = External::new(&f, &w).in_mode(given);
             simulator.advance(&mut state, &u).unwrap();
             let mut trial = state.clone();
             let change = Change { command: &u, fault: &f, disturbance: &w };

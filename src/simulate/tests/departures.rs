@@ -57,12 +57,7 @@ fn run(deviation: Deviation) -> Vec<PlantState> {
     let truth = TruePlant::AsDesigned.with_deviation(deviation);
     let simulator = PlantSimulator::with_true_plant(plant(), truth, scenario());
     let mut state = simulator.initial_state();
-    let external = External {
-        fault: &[0.0],
-        disturbance: &[0.0],
-        mode: None,
-        noise: true,
-    };
+    let external = External::new(&[0.0], &[0.0]);
     (0..20)
         .map(|k| {
             simulator.observe(&mut state, &external);
@@ -275,12 +270,7 @@ fn derivatives_know_the_departures() {
     ] {
         let truth = TruePlant::AsDesigned.with_deviation(deviation);
         let simulator = PlantSimulator::with_true_plant(plant(), truth, scenario());
-        let external = External {
-            fault: &[0.0],
-            disturbance: &[0.0],
-            mode: None,
-            noise: false,
-        };
+        let external = External::new(&[0.0], &[0.0]).with_noise(false);
         let mut state = simulator.initial_state();
         simulator.observe(&mut state, &external);
         let after = |u: f64| {

@@ -31,10 +31,7 @@ fn the_operating_point_is_a_steady_state() {
 #[test]
 fn energy_is_conserved() {
     let plant = rectifier();
-    let tolerance = Tolerance {
-        relative: 1e-10,
-        absolute: 1e-10,
-    };
+    let tolerance = Tolerance::new(1e-10, 1e-10);
     let u = [25.0, -8.0];
     let balance = |z: &[f64; 4]| {
         let x = [z[0], z[1], z[2]];
@@ -65,10 +62,7 @@ fn energy_is_conserved() {
 #[test]
 fn the_diodes_hold_the_link_up() {
     let plant = rectifier();
-    let tolerance = Tolerance {
-        relative: 1e-10,
-        absolute: 1e-10,
-    };
+    let tolerance = Tolerance::new(1e-10, 1e-10);
     let u = [-40.0, 40.0];
     let load = plant.loads[1];
     let balance = |z: &[f64; 4]| {
@@ -125,10 +119,7 @@ fn the_linearisation_predicts_a_small_step() {
     let mode = &linear.modes[1];
     let point = &mode.operating_point;
     let mut x = [point.x[0], point.x[1], point.x[2]];
-    let tolerance = Tolerance {
-        relative: 1e-11,
-        absolute: 1e-11,
-    };
+    let tolerance = Tolerance::new(1e-11, 1e-11);
     let small = 1e-3;
     let u = [point.u[0] + small, point.u[1] + small];
     integrate::advance(&mut x, 5e-3, tolerance, |x| {

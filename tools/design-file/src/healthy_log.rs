@@ -267,9 +267,7 @@ fn database(rows: &[Row], mode: &Mode, first: usize) -> Database {
     let about = |pick: fn(&Row) -> &Vec<f64>, point: &[f64]| {
         DMatrix::from_fn(rows.len(), point.len(), |k, i| pick(&rows[k])[i] - point[i])
     };
-    Database {
-        first,
-        inputs: about(|row| &row.inputs, &mode.operating_point.u),
-        outputs: about(|row| &row.outputs, &mode.operating_point.y),
-    }
+    let inputs = about(|row| &row.inputs, &mode.operating_point.u);
+    let outputs = about(|row| &row.outputs, &mode.operating_point.y);
+    Database::new(first, inputs, outputs).expect("each row of a log has both")
 }

@@ -214,18 +214,14 @@ fn predict(
     input_weight: f64,
 ) -> Result<Trajectory, Error> {
     let controller = &design.controller;
-    let spec = PredictiveSpec {
-        tracked: controller.feedback.tracked.clone(),
-        output_weight: design.proof.as_ref().map_or_else(
-            || vec![1.0; controller.feedback.tracked.len()],
-            |proof| proof.state_feedback.output_weight.clone(),
-        ),
-        input_weight: vec![input_weight; design.signals.inputs.len()],
-        limits: design.signals.input_limits(),
-        noise: design.scenario.noise.clone(),
-        disturbance: vec![1.0; design.scenario.disturbance.len()],
-        horizon,
-    };
+    let tracked = controller.feedback.tracked.clone();
+    let mut spec = PredictiveSpec::new(&design.plant, tracked, design.scenario.noise.clone());
+    if let Some(proof) = &design.proof {
+        (spec.output_weight).clone_from(&proof.state_feedback.output_weight);
+    }
+    spec.input_weight.fill(input_weight);
+    spec.limits = design.signals.input_limits();
+    spec.horizon = horizon;
     let mode = plant.initial_state().mode;
     let mut predictive = Predictive::new(&design.plant, &spec, mode)?;
     Ok(run_with(plant, &mut predictive, Variant::Predictive, false))

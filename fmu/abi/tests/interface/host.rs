@@ -1,4 +1,4 @@
-//! The test slave, its C functions as a C program sees them, and an instance to play with.
+//! The test slave, its C functions as a C program sees them, and an instance for the tests.
 
 #[path = "../../examples/staircase.rs"]
 pub mod staircase;

@@ -183,7 +183,7 @@ impl Conic {
 const LARGEST_RESIDUAL: f64 = 1e-5;
 
 /// The ways to solve, in the order they are tried. One thread, so that the same problem gives the
-/// same bits; tight tolerances, since strict inequalities live from the last digits.
+/// same bits; tight tolerances, since strict inequalities depend on the last digits.
 fn settings() -> [DefaultSettings<f64>; 3] {
     let usual = DefaultSettings {
         verbose: false,

@@ -76,7 +76,7 @@ pub struct Problem {
     pub(super) normalised: Option<(Vec<Option<Variable>>, f64)>,
 }
 
-/// What the solver came back with: to be judged, not trusted.
+/// What the solver returned, not yet verified.
 #[derive(Clone, Debug)]
 pub struct Candidate {
     /// The scalars of the problem, to be read through [`Variable::value`].

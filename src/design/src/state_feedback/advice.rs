@@ -37,7 +37,7 @@ pub(super) fn search(
     advice
 }
 
-/// The fastest decay on a coarse ladder, slower than asked, that works.
+/// The fastest decay on a coarse grid, slower than asked, that is feasible.
 fn fastest_feasible_decay(spec: &ControlSpec, works: &dyn Fn(&ControlSpec) -> bool) -> Option<f64> {
     Advice::DECAYS.into_iter().find(|&decay| {
         let slower = ControlSpec {

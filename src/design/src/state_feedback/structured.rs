@@ -28,7 +28,7 @@ use nalgebra::DMatrix;
 /// How far, as a factor, Lyapunov matrices may be from the identity on average.
 const REACH: f64 = 1e6;
 
-/// Share of that at which the limit counts as felt.
+/// Share of that at which the limit counts as active.
 const AT_REACH: f64 = 1e-2;
 
 /// How much larger than the identity the Lyapunov matrices of a centred solution may be on average.

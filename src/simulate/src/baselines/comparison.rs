@@ -93,17 +93,15 @@ fn predictive(design: &Design, disturbance: Vec<f64>) -> Result<PredictiveSpec, 
     let asked = &proof.state_feedback;
     let outputs = design.signals.outputs.iter();
     let noise = outputs.zip(&design.scenario.noise);
-    Ok(PredictiveSpec {
-        tracked: design.controller.feedback.tracked.clone(),
-        output_weight: asked.output_weight.clone(),
-        input_weight: asked.input_weight.clone(),
-        limits: design.signals.input_limits(),
-        noise: noise
-            .map(|(output, noise)| noise.max(LEAST_NOISE * output.nominal))
-            .collect(),
-        disturbance,
-        horizon: HORIZON,
-    })
+    let noise = noise.map(|(output, noise)| noise.max(LEAST_NOISE * output.nominal));
+    let tracked = design.controller.feedback.tracked.clone();
+    let mut spec = PredictiveSpec::new(&design.plant, tracked, noise.collect());
+    spec.output_weight.clone_from(&asked.output_weight);
+    spec.input_weight.clone_from(&asked.input_weight);
+    spec.limits = design.signals.input_limits();
+    spec.disturbance = disturbance;
+    spec.horizon = HORIZON;
+    Ok(spec)
 }
 
 /// Per tracked output, the deadbeat bound of the scenario's reference, gathered sample by sample: the

@@ -26,6 +26,7 @@ use std::ops::AddAssign;
 
 /// What the controller is asked for.
 #[derive(Clone, Debug, PartialEq)]
+#[non_exhaustive]
 pub struct PredictiveSpec {
     /// Tracked outputs (0-based), `r`.
     pub tracked: Vec<usize>,
@@ -41,6 +42,23 @@ pub struct PredictiveSpec {
     pub disturbance: Vec<f64>,
     /// Samples looked ahead, `N`.
     pub horizon: usize,
+}
+
+impl PredictiveSpec {
+    /// For the tracked outputs (0-based) of a plant whose sensors have the given noise (p): 20 samples
+    /// ahead, no limits, weights 1 of outputs and 0.1 of inputs, disturbances of deviation 1.
+    pub fn new(plant: &SwitchedPlant, tracked: Vec<usize>, noise: Vec<f64>) -> Self {
+        let dims = plant.dimensions();
+        Self {
+            output_weight: vec![1.0; tracked.len()],
+            input_weight: vec![0.1; dims.inputs],
+            limits: vec![Limits::default(); dims.inputs],
+            noise,
+            disturbance: vec![1.0; dims.disturbances],
+            horizon: 20,
+            tracked,
+        }
+    }
 }
 
 /// The model predictive controller.

@@ -23,7 +23,7 @@ pub struct Departed {
     pub(super) reading: Vec<f64>,
     /// Scratch for injected noise (p).
     pub(super) draws: Vec<f64>,
-    /// Whether the scenario plays.
+    /// Whether the scenario runs.
     pub(super) scenario_enabled: bool,
 }
 
@@ -84,8 +84,8 @@ impl PlantSimulator {
             Some(told) => told.mode,
             None if deviation.mode_delay == 0 => mode,
             None => self
-                .scenario
-                .mode(tick.saturating_sub(deviation.mode_delay), te),
+                .schedule
+                .mode(tick.saturating_sub(deviation.mode_delay)),
         };
         told.min(self.plant.modes.len().saturating_sub(1))
     }
@@ -124,7 +124,7 @@ impl PlantSimulator {
         kernel::bound(&mut departed.applied);
     }
 
-    /// Whether anything acts on inputs while the scenario plays.
+    /// Whether anything acts on inputs while the scenario runs.
     fn moves_inputs(&self) -> bool {
         !(self.deviation.actuator_faults.is_empty() && self.deviation.loads.is_empty())
     }

@@ -5,10 +5,7 @@ use ftc_control::kernel;
 use ftc_plant::rectifier::Rectifier;
 
 /// Accuracy of the nonlinear plant, far below any sensor's.
-const ACCURACY: Tolerance = Tolerance {
-    relative: 1e-9,
-    absolute: 1e-9,
-};
+const ACCURACY: Tolerance = Tolerance::new(1e-9, 1e-9);
 
 /// Moves the rectifier's state `x` over one sample under held `u` and `w`.
 ///

@@ -225,7 +225,7 @@ impl Bank {
                 .iter()
                 .filter(|c| self.kind(state, c) == kind && c.convinced == candidate.convinced)
                 .count();
-            if alike >= ALIKE {
+            if alike >= ALIKE || self.is_twin(state, &candidate, kept) {
                 continue;
             }
             plain |= unaccused;
@@ -235,6 +235,26 @@ impl Bank {
             kept += 1;
         }
         state.candidates.count = kept;
+    }
+
+    /// Whether one of the `kept` candidates goes on as this one does, from the same estimate, and leaves the
+    /// same of the readings.
+    fn is_twin(&self, state: &BankState, candidate: &Candidate, kept: usize) -> bool {
+        if candidate.action != Action::Stay {
+            return false;
+        }
+        let (h, seen) = (
+            &state.slots[candidate.parent],
+            &state.seen[candidate.parent],
+        );
+        state.candidates.list[..kept].iter().any(|other| {
+            let o = &state.slots[other.parent];
+            other.action == Action::Stay
+                && o.kinds() == h.kinds()
+                && (o.loose, o.convinced, o.mode) == (h.loose, h.convinced, h.mode)
+                && o.has_estimate(&h.z)
+                && state.seen[other.parent].leaves(&seen.r)
+        })
     }
 
     /// The candidates that stay become the hypotheses in competition.

@@ -13,6 +13,10 @@ use alloc::vec;
 use alloc::vec::Vec;
 use serde::{Deserialize, Serialize};
 
+/// Square of the difference of two innovations, or estimates, relative to the variance, up to which they
+/// are the same.
+const SAME: f64 = 0.1;
+
 /// A set of sensors, as bits.
 pub type Sensors = u64;
 
@@ -206,6 +210,16 @@ impl Innovation {
         }
     }
 
+    /// Whether an innovation `r` (p) is about the same as this one, after [`whiten`](Self::whiten).
+    pub fn leaves(&self, r: &[f64]) -> bool {
+        let p = r.len();
+        self.r.iter().zip(r).enumerate().all(|(q, (own, other))| {
+            let factor = &self.s[q * p..=q * p + q];
+            let off = own - other;
+            off * off <= SAME * dot(factor, factor)
+        })
+    }
+
     /// Logarithm of the likelihood, after [`whiten`](Self::whiten).
     pub fn likelihood(&self, p: usize) -> f64 {
         if !self.sound {
@@ -305,6 +319,17 @@ impl Hypothesis {
         self.moved_by = other.moved_by;
         self.score = other.score;
         self.misfit = other.misfit;
+    }
+
+    /// Whether an estimate `z` (N, padded) is about the same as this one.
+    pub fn has_estimate(&self, z: &[f64]) -> bool {
+        let stride = self.z.len();
+        let pairs = self.z.iter().zip(z);
+        let mut variances = self.cov.iter().step_by(stride + 1);
+        pairs.zip(&mut variances).all(|((own, other), variance)| {
+            let off = own - other;
+            off * off <= SAME * variance
+        })
     }
 
     /// How many entries of the state are in use.

@@ -426,17 +426,19 @@ impl Bank {
     /// Load and gain error of the leading hypothesis as an input.
     fn find_load(&self, state: &mut BankState, model: &ModeModel) {
         let Layout { n, m, .. } = self.layout;
-        let (load, gain, loads) = (self.layout.load(), self.layout.gain(), self.layout.loads());
+        let (load, gain) = (self.layout.load(), self.layout.gain());
         let z = &state.slots[state.best].z;
         for j in 0..m {
             state.load[j] = z[load + j] + state.u[j] * z[gain + j];
-            for i in 0..n {
-                let others = m..loads;
-                let effect = dot(
-                    &model.g[i * loads + m..(i + 1) * loads],
-                    &z[load..gain][others],
-                );
-                state.load[j] += model.b_inverse[j * n + i] * effect;
+        }
+        for i in 0..n {
+            let others = model.motion.parts(i)[2].iter();
+            let mut effect = 0.0;
+            for &(at, g) in others.filter(|(at, _)| *at >= load + m) {
+                effect += g * z[at];
+            }
+            for (j, sum) in state.load.iter_mut().enumerate() {
+                *sum += model.b_inverse[j * n + i] * effect;
             }
         }
     }

@@ -25,6 +25,8 @@ pub(super) struct OwnRun {
     before: Vec<f64>,
     /// Outputs (p).
     pub y: Vec<f64>,
+    /// Variance of each state that the model's error allows (n).
+    variances: Vec<f64>,
     /// Their covariance that the model's error allows (p x p).
     bound: Vec<f64>,
     /// Variance of a reading around them (p).
@@ -36,7 +38,7 @@ pub(super) struct OwnRun {
 }
 
 crate::state!(OwnRun {
-    parts: [x, before, y, bound, spread, error, allowed],
+    parts: [x, before, y, variances, bound, spread, error, allowed],
     constants: [],
     counters: []
 });
@@ -50,6 +52,7 @@ impl OwnRun {
             x: model.x0.clone(),
             before: vec![0.0; model.x0.len() + d],
             y: vec![0.0; model.bias.len()],
+            variances: vec![0.0; model.x0.len()],
             bound: vec![0.0; model.bias.len() * model.bias.len()],
             spread: vec![0.0; model.bias.len()],
             error: allowed.clone(),
@@ -61,10 +64,13 @@ impl OwnRun {
     /// `noise` (p) may be from them.
     pub fn read(&mut self, model: &ModeModel, settings: &Settings, z: &[f64], noise: &[f64]) {
         let p = self.y.len();
+        for k in 0..self.x.len() {
+            self.variances[k] = self.variance(model, settings, k);
+        }
         for (q, noise) in noise.iter().enumerate().take(p) {
             self.y[q] = model.output(q, &self.x, z);
             for j in 0..=q {
-                let allowed = self.allowed(model, settings, q, j);
+                let allowed = self.allowed(model, q, j);
                 self.bound[q * p + j] = allowed;
                 self.bound[j * p + q] = allowed;
             }
@@ -127,13 +133,11 @@ impl OwnRun {
         }
     }
 
-    fn allowed(&self, model: &ModeModel, settings: &Settings, q: usize, j: usize) -> f64 {
+    fn allowed(&self, model: &ModeModel, q: usize, j: usize) -> f64 {
         let n = self.x.len();
         let row = |q: usize| &model.c[q * n..(q + 1) * n];
-        let pairs = row(q).iter().zip(row(j)).enumerate();
-        pairs
-            .map(|(k, (a, b))| a * b * self.variance(model, settings, k))
-            .sum()
+        let pairs = row(q).iter().zip(row(j)).zip(&self.variances);
+        pairs.map(|((a, b), variance)| a * b * variance).sum()
     }
 
     /// Variance of output `q` relative to what the model's error allows.

@@ -1,9 +1,13 @@
 //! What may have happened to a hypothesis since the last sample.
 
 use super::competition::{AT_START, Action, Candidate, QUIET, TOGETHER, UNLIKE};
-use super::hypothesis::{Reading, Sensors, has};
+use super::hypothesis::{Hypothesis, Reading, Sensors, has};
 use super::model::ModeModel;
 use super::{APART, Bank, BankState, DISPLACED, FREEZING};
+
+/// What it costs per sample, in log likelihood, that a fault has come to nothing and yet is there: after two
+/// hundred or so it is forgotten.
+const FADING: f64 = 0.05;
 
 /// The hypothesis to which something may have happened.
 #[derive(Clone, Copy)]
@@ -44,7 +48,7 @@ impl Bank {
     ) {
         let p = self.layout.p;
         let (h, seen) = (&state.slots[slot], &state.seen[slot]);
-        let parent = Parent {
+        let mut parent = Parent {
             slot,
             score: h.score,
             stay: h.score + seen.likelihood(p),
@@ -55,12 +59,51 @@ impl Bank {
             unlikely: seen.square > QUIET.min(4.0 + p as f64),
         };
         state.outlook.stale = true;
+        if slot != state.best && self.has_come_to_nothing(h, reading) {
+            parent.stay -= FADING;
+        }
         state
             .candidates
             .add(parent.then(Action::Stay, parent.stay, parent.convinced));
         self.propose_changes(state, parent, model, reading);
         self.propose_faults(state, parent, model, reading);
         self.propose_ends(state, parent, model, reading);
+    }
+
+    /// Whether the faults of a hypothesis, biases all of them, are none any more.
+    fn has_come_to_nothing(&self, h: &Hypothesis, reading: Reading<'_>) -> bool {
+        let (fault, stride) = (self.layout.fault(), self.layout.stride());
+        let biases = h.additive != 0 && h.additive == h.accused() && h.convinced;
+        let mut faults = (0..self.layout.p).filter(|&q| has(h.additive, q));
+        biases
+            && faults.all(|q| {
+                let (k, noise) = (fault + q, reading.noise[q]);
+                let most = h.cov[k * (stride + 1)].min(DISPLACED * noise * noise);
+                h.z[k] * h.z[k] <= most
+            })
+    }
+
+    /// Whether another hypothesis with at least this `score` after the sample, which says of the sensors in
+    /// `accused` alone that they have a bias, leaves of the readings what `r` (p) leaves.
+    fn is_said_already(
+        &self,
+        state: &BankState,
+        parent: Parent,
+        r: &[f64],
+        accused: Sensors,
+        score: f64,
+    ) -> bool {
+        let p = self.layout.p;
+        state.live.slots().any(|slot| {
+            let (h, seen) = (&state.slots[slot], &state.seen[slot]);
+            slot != parent.slot
+                && h.accused() == accused
+                && h.additive == accused
+                && h.convinced
+                && (h.loose, h.mode) == (parent.loose, state.slots[parent.slot].mode)
+                && h.score + seen.likelihood(p) >= score
+                && seen.leaves(r)
+        })
     }
 
     /// Adds a candidate with the logarithm of its probability; an accusation is convinced only where the
@@ -217,17 +260,37 @@ impl Bank {
                 self.consider(state, parent, model, reading, change);
             }
             let last = parent.accused.count_ones() == 1;
-            let release = (
-                Action::Release(1 << q),
-                prices.release,
-                parent.convinced || last,
+            let convinced = parent.convinced || last;
+            self.propose_release(
+                state,
+                parent,
+                model,
+                reading,
+                (1 << q, prices.release, convinced),
             );
-            self.consider(state, parent, model, reading, release);
         }
         if known.count_ones() > 1 {
-            let all = Action::Release(parent.accused);
-            let release = (all, TOGETHER * prices.release, true);
-            self.consider(state, parent, model, reading, release);
+            let all = (parent.accused, TOGETHER * prices.release, true);
+            self.propose_release(state, parent, model, reading, all);
+        }
+    }
+
+    /// The recovery of the sensors in `set`, unless what it leaves is there already: it can be proposed
+    /// again at every later sample.
+    fn propose_release(
+        &self,
+        state: &mut BankState,
+        parent: Parent,
+        model: &ModeModel,
+        reading: Reading<'_>,
+        (set, price, convinced): (Sensors, f64, bool),
+    ) {
+        let action = Action::Release(set);
+        let value = self.trial(state, parent.slot, model, reading, action);
+        let score = parent.score + price + value;
+        let left = parent.accused & !set;
+        if !self.is_said_already(state, parent, &state.trial.r, left, score) {
+            state.candidates.add(parent.then(action, score, convinced));
         }
     }
 }
