@@ -62,8 +62,8 @@ impl Bank {
                 let v = model.a[i * n + j] * (h.z[j] - model.x0[j]);
                 sum += v * v;
             }
-            for j in 0..m {
-                let v = model.b[i * m + j] * (u[j] - model.u0[j]);
+            for (j, u) in u.iter().enumerate().take(m) {
+                let v = model.b[i * m + j] * (u - model.u0[j]);
                 sum += v * v;
             }
             let k = load + i;
