@@ -2,6 +2,7 @@
 
 use super::hypothesis::{Hypothesis, Kinds, Reading, Sensors, has};
 use super::model::{Layout, ModeModel};
+use super::own_run::OwnRun;
 use super::{Bank, BankState, KEEP, Live, RENEWED};
 use alloc::vec;
 use alloc::vec::Vec;
@@ -49,8 +50,20 @@ pub(super) enum Action {
     Start,
     /// No load acts: the readings have come back to the model's own run.
     Home,
+    /// No load acts but the usual ones: the readings have come back to the model's run under those.
+    Return,
     /// No load acts: these sensors have drifted away from the model's own run.
     Drift(Sensors),
+}
+
+impl Action {
+    /// Of the model's `own` run and that under the `usual` loads, the one to which it puts a hypothesis back.
+    pub(super) const fn run<'a>(self, own: &'a OwnRun, usual: &'a OwnRun) -> &'a OwnRun {
+        match self {
+            Self::Return => usual,
+            _ => own,
+        }
+    }
 }
 
 /// One of them, and what it leaves.
@@ -79,7 +92,7 @@ impl Candidates {
             convinced: false,
         };
         Self {
-            list: vec![none; slots * (6 + jumps + 6 * outputs + outputs * outputs)],
+            list: vec![none; slots * (7 + jumps + 6 * outputs + outputs * outputs)],
             count: 0,
         }
     }
@@ -147,7 +160,7 @@ impl Bank {
             Action::Stay | Action::Load(_) | Action::Loosen | Action::Tighten | Action::Start => {
                 now
             }
-            Action::Home => Kinds {
+            Action::Home | Action::Return => Kinds {
                 additive: 0,
                 stuck: 0,
                 scaled: 0,
@@ -299,6 +312,7 @@ impl Bank {
             | Action::Freeze(_)
             | Action::Start
             | Action::Home
+            | Action::Return
             | Action::Drift(_) => -2.0 * self.prices.fault,
             Action::Change(_) => -2.0 * self.prices.change,
         };

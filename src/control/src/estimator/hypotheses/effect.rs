@@ -3,6 +3,7 @@
 use super::competition::{Action, Candidate, SCALE_MEAN, SCALE_VARIANCE};
 use super::hypothesis::{Hypothesis, Reading, has};
 use super::model::ModeModel;
+use super::own_run::OwnRun;
 use super::{Bank, BankState};
 
 /// Variance of loads and input gains that are said to be gone, relative to that of their jumps.
@@ -55,12 +56,13 @@ impl Bank {
                     child.cov[k * stride + k] += sd * sd;
                 }
             }
-            Action::Home | Action::Drift(_) => {
-                for (k, &x) in state.own.x.iter().enumerate() {
-                    child.open(k, x, state.own.variance(model, settings, k));
+            Action::Home | Action::Return | Action::Drift(_) => {
+                let run = candidate.action.run(&state.own, &state.usual);
+                for (k, &x) in run.x.iter().enumerate() {
+                    child.open(k, x, run.variance(model, settings, k));
                     child.before[k] = x;
                 }
-                self.forget_loads(child, model);
+                self.forget_loads(child, model, run);
                 for q in 0..p {
                     let variance = match has(child.additive, q) {
                         true => self.fault_variance(q),
@@ -85,14 +87,15 @@ impl Bank {
         }
     }
 
-    /// Loads and errors of the input gains are gone.
-    fn forget_loads(&self, h: &mut Hypothesis, model: &ModeModel) {
+    /// Loads and errors of the input gains are those of the model's `run`.
+    fn forget_loads(&self, h: &mut Hypothesis, model: &ModeModel, run: &OwnRun) {
         for (k, size) in model.load_size.iter().enumerate() {
-            h.open(self.layout.load() + k, 0.0, REMAINS * size * size);
+            let k = self.layout.load() + k;
+            h.open(k, run.load(k), REMAINS * size * size);
         }
         let gain = self.settings.gain_error;
         for k in self.layout.gain()..self.layout.fault() {
-            h.open(k, 0.0, REMAINS * gain * gain);
+            h.open(k, run.load(k), REMAINS * gain * gain);
         }
     }
 

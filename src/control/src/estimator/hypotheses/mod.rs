@@ -180,6 +180,8 @@ pub struct BankState {
     misfit: f64,
     /// The model's own run under the commands alone.
     own: OwnRun,
+    /// The same under the loads and gain errors that are usual.
+    usual: OwnRun,
     /// Outputs that the leading hypothesis expects of healthy sensors (p).
     pub expected: Vec<f64>,
     /// What the readings leave unexplained; of an accused sensor its fault (p).
@@ -217,6 +219,7 @@ crate::state!(BankState {
         mean,
         count,
         own,
+        usual,
         expected,
         residual,
         load,
@@ -275,7 +278,9 @@ impl Bank {
         let bias = self.output_error();
         let z = &state.slots[state.best].z;
         let model = self.model(state, state.best);
-        state.own.read(model, &self.settings, z, reading.noise);
+        for run in [&mut state.own, &mut state.usual] {
+            run.read(model, &self.settings, z, reading.noise);
+        }
         for slot in state.live.slots() {
             let model = self.model(state, slot);
             let h = &state.slots[slot];
@@ -310,6 +315,11 @@ impl Bank {
         let displaced = state.own.displaced(&state.expected, DISPLACED);
         state.apart = state.own.displaced(&state.expected, APART);
         state.own.learn(&state.expected);
+        state.usual.learn(&state.expected);
+        let best = &state.slots[state.best];
+        if best.accused() == 0 && !best.loose {
+            state.usual.learn_loads(layout, &best.z);
+        }
         state.suspect |= displaced & !state.slots[state.best].accused();
     }
 
@@ -391,11 +401,11 @@ impl Bank {
         state.moved_by = best.moved_by;
         let moved = &self.modes[best.moved_by as usize];
         let next = &mut state.scratch[..self.layout.n];
-        state.own.repeat(self.layout.m, moved, &state.u, next);
         let model = &self.modes[state.mode];
-        state
-            .own
-            .read(model, &self.settings, &best.z, reading.noise);
+        for run in [&mut state.own, &mut state.usual] {
+            run.repeat(self.layout, moved, &state.u, next);
+            run.read(model, &self.settings, &best.z, reading.noise);
+        }
     }
 
     fn conclude(&self, state: &mut BankState, reading: Reading<'_>) {
@@ -480,7 +490,9 @@ impl Bank {
         }
         let z = &state.slots[state.best].z;
         let next = &mut state.scratch[..self.layout.n];
-        state.own.advance(self.layout.m, model, z, u, next);
+        for run in [&mut state.own, &mut state.usual] {
+            run.advance(self.layout, model, z, u, next);
+        }
         state.moved_by = state.mode as u32;
         self.branch(state, false);
         let mut step = Step {

@@ -1,8 +1,8 @@
 //! The model's own run: what the plant would do under the commands alone, and how far that is right.
 
 use super::hypothesis::Sensors;
-use super::linear::{dot, sparse_dot};
-use super::model::ModeModel;
+use super::linear::sparse_dot;
+use super::model::{Layout, ModeModel};
 use crate::kernel::bounded;
 use crate::parameters::Hypotheses as Settings;
 use alloc::vec;
@@ -13,6 +13,8 @@ use serde::{Deserialize, Serialize};
 const MEMORY: f64 = 300.0;
 /// Least and largest variance of that error, relative to what the model's error allows.
 const SHARE: [f64; 2] = [0.02, 1.0];
+/// Samples over which a load becomes usual.
+const USUAL: f64 = 1000.0;
 /// The state at the start may be off by so many of its standard deviations.
 const START: f64 = 3.0;
 
@@ -21,7 +23,7 @@ const START: f64 = 3.0;
 pub(super) struct OwnRun {
     /// State (n).
     pub x: Vec<f64>,
-    /// State and disturbance before it moved (n + d).
+    /// What moved it to this sample: state and disturbance before, loads and gain errors (N, faults unused).
     before: Vec<f64>,
     /// Outputs (p).
     pub y: Vec<f64>,
@@ -44,13 +46,13 @@ crate::state!(OwnRun {
 });
 
 impl OwnRun {
-    /// At rest at the operating point, beside `d` states of the disturbance.
-    pub fn new(model: &ModeModel, settings: &Settings, d: usize) -> Self {
+    /// At rest at the operating point without loads, for a joint state of `size`.
+    pub fn new(model: &ModeModel, settings: &Settings, size: usize) -> Self {
         let error = settings.model_error * settings.model_error;
         let allowed: Vec<f64> = model.bias.iter().map(|square| error * square).collect();
         Self {
             x: model.x0.clone(),
-            before: vec![0.0; model.x0.len() + d],
+            before: vec![0.0; size],
             y: vec![0.0; model.bias.len()],
             variances: vec![0.0; model.x0.len()],
             bound: vec![0.0; model.bias.len() * model.bias.len()],
@@ -79,21 +81,31 @@ impl OwnRun {
     }
 
     /// One sample on under the input `u` (m), with the disturbance as `z` (N) knows it. `next` holds n.
-    pub fn advance(&mut self, m: usize, model: &ModeModel, z: &[f64], u: &[f64], next: &mut [f64]) {
-        let (states, waves) = self.before.split_at_mut(self.x.len());
-        states.copy_from_slice(&self.x);
-        waves.copy_from_slice(&z[states.len()..][..waves.len()]);
-        self.repeat(m, model, u, next);
+    pub fn advance(
+        &mut self,
+        layout: Layout,
+        model: &ModeModel,
+        z: &[f64],
+        u: &[f64],
+        next: &mut [f64],
+    ) {
+        let waves = layout.n..layout.load();
+        self.before[..layout.n].copy_from_slice(&self.x);
+        self.before[waves.clone()].copy_from_slice(&z[waves]);
+        self.repeat(layout, model, u, next);
     }
 
     /// The last sample once more, in another mode.
-    pub fn repeat(&mut self, m: usize, model: &ModeModel, u: &[f64], next: &mut [f64]) {
+    pub fn repeat(&mut self, layout: Layout, model: &ModeModel, u: &[f64], next: &mut [f64]) {
         let before = &self.before;
         for (i, next) in next.iter_mut().enumerate() {
-            let [own, waves, _] = model.motion.parts(i);
+            let [own, waves, loads] = model.motion.parts(i);
             let mut sum =
                 model.state_offset[i] + sparse_dot(own, before) + sparse_dot(waves, before);
-            sum += dot(&model.b[i * m..(i + 1) * m], u);
+            sum += sparse_dot(loads, before);
+            for &(at, b) in model.by_gain.row(i) {
+                sum += b * u[at - layout.gain()] * (1.0 + before[at]);
+            }
             *next = bounded(sum);
         }
         self.x.copy_from_slice(next);
@@ -121,6 +133,19 @@ impl OwnRun {
     /// Covariance of the outputs `q` and `j`, by what the error has been so far.
     pub fn covariance(&self, q: usize, j: usize) -> f64 {
         libm::sqrt(self.share(q) * self.share(j)) * self.bound[q * self.y.len() + j]
+    }
+
+    /// Learns which loads and gain errors are usual, from those of the leading hypothesis `z` (N).
+    pub fn learn_loads(&mut self, layout: Layout, z: &[f64]) {
+        let loads = layout.load()..layout.fault();
+        for (usual, now) in self.before[loads.clone()].iter_mut().zip(&z[loads]) {
+            *usual += (now - *usual) / USUAL;
+        }
+    }
+
+    /// The load or gain error under which it runs, by its entry of the joint state.
+    pub fn load(&self, k: usize) -> f64 {
+        self.before[k]
     }
 
     /// Learns the error, given the `outputs` (p) that the leading hypothesis expects.

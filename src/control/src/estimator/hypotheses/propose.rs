@@ -3,6 +3,7 @@
 use super::competition::{AT_START, Action, Candidate, QUIET, TOGETHER, UNLIKE};
 use super::hypothesis::{Hypothesis, Reading, Sensors, has};
 use super::model::ModeModel;
+use super::own_run::OwnRun;
 use super::{APART, Bank, BankState, DISPLACED, FREEZING};
 
 /// What it costs per sample, in log likelihood, that a fault has come to nothing and yet is there: after two
@@ -161,10 +162,15 @@ impl Bank {
             }
             return;
         }
-        if parent.unlikely && state.own.displaced(&state.seen[parent.slot].output, APART) != 0 {
-            // What stands against the loads that would then be gone makes up for the price of a fault.
-            let against = implausible(model, &state.slots[parent.slot].z[self.layout.load()..]);
-            consider(state, Action::Home, (prices.fault + against).min(0.0));
+        for back in [Action::Home, Action::Return] {
+            let run = back.run(&state.own, &state.usual);
+            let output = &state.seen[parent.slot].output;
+            if parent.unlikely && run.displaced(output, APART) != 0 {
+                // What stands against the loads that would then be gone makes up for the price of a fault.
+                let z = &state.slots[parent.slot].z;
+                let against = self.implausible(model, z, run);
+                consider(state, back, (prices.fault + against).min(0.0));
+            }
         }
         if parent.accused == 0 {
             self.propose_drift(state, parent, model, reading);
@@ -277,6 +283,18 @@ impl Bank {
         }
     }
 
+    /// What a priori stands against the loads in `z` (N) where those of `run` are usual, in log likelihood.
+    fn implausible(&self, model: &ModeModel, z: &[f64], run: &OwnRun) -> f64 {
+        let mut sum = 0.0;
+        for (k, &size) in (self.layout.load()..).zip(&model.load_size) {
+            let off = z[k] - run.load(k);
+            if size > 0.0 {
+                sum += 0.5 * (off / size) * (off / size);
+            }
+        }
+        sum
+    }
+
     /// The recovery of the sensors in `set`, unless what it leaves is there already: it can be proposed
     /// again at every later sample.
     fn propose_release(
@@ -295,15 +313,6 @@ impl Bank {
             state.candidates.add(parent.then(action, score, convinced));
         }
     }
-}
-
-/// What a priori stands against loads of these sizes, in log likelihood.
-fn implausible(model: &ModeModel, loads: &[f64]) -> f64 {
-    let sizes = model.load_size.iter().zip(loads);
-    let squares = sizes
-        .filter(|(size, _)| **size > 0.0)
-        .map(|(size, load)| (load / size) * (load / size));
-    0.5 * squares.sum::<f64>()
 }
 
 /// All of `p` sensors.

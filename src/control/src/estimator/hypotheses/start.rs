@@ -216,7 +216,7 @@ impl Bank {
     /// the plant's as well.
     pub fn start(&self, mode: usize) -> BankState {
         let layout = self.layout;
-        let Layout { n, m, p, d, .. } = layout;
+        let Layout { n, m, p, .. } = layout;
         let stride = layout.stride();
         let settings = &self.settings;
         let model = &self.modes[mode];
@@ -254,7 +254,8 @@ impl Bank {
             best: 0,
             apart: 0,
             misfit: p as f64,
-            own: OwnRun::new(model, settings, d),
+            own: OwnRun::new(model, settings, layout.size()),
+            usual: OwnRun::new(model, settings, layout.size()),
             expected: vec![0.0; p],
             residual: vec![0.0; p],
             accused: 0,

@@ -100,7 +100,7 @@ fn add_pairs(s: &mut [f64], p: usize, which: Sensors, term: impl Fn(usize, usize
 
 /// Whether what happened puts the state back to the model's own run.
 const fn starts_anew(action: Action) -> bool {
-    matches!(action, Action::Home | Action::Drift(_))
+    matches!(action, Action::Home | Action::Return | Action::Drift(_))
 }
 
 impl Bank {
@@ -130,7 +130,8 @@ impl Bank {
         let p = self.layout.p;
         let kinds = self.sets(&state.slots[slot], action);
         let bias = self.output_error();
-        let (outlook, own, mean) = (&state.outlook, &state.own, &state.mean);
+        let own = action.run(&state.own, &state.usual);
+        let (outlook, mean) = (&state.outlook, &state.mean);
         let Innovation { r, s, weights, .. } = &mut state.trial;
         for q in 0..p {
             s[q * p..=q * p + q].fill(0.0);
@@ -212,7 +213,8 @@ impl Bank {
                     });
                 }
             }
-            Action::Stay | Action::Tighten | Action::Release(_) | Action::Home => {}
+            Action::Stay | Action::Tighten | Action::Release(_) | Action::Home | Action::Return => {
+            }
         }
     }
 }
