@@ -9,7 +9,6 @@ mod random_plants;
 
 use common::{Channel, REFERENCES, plant, reference, scenario, state_based};
 use ftc_control::Controller;
-use ftc_control::parameters::EstimatorMethod;
 use ftc_design::apart::ENOUGH;
 use ftc_design::warnings::{self, Warning};
 use ftc_design::{Design, MODE_LENGTH};
@@ -64,14 +63,9 @@ fn the_papers_modes_are_found_while_both_sensors_are_faulty() {
 /// Random designs whose modes last 40 to 120 samples.
 fn designs(seed: u64, count: usize) -> Vec<Design> {
     let mut dice = Dice::seeded(seed);
-    let mut found = Vec::new();
-    while found.len() < count {
-        let mut design = random_plants::design_with(&mut dice, EstimatorMethod::Observer);
-        let plant = &design.plant;
-        if plant.dimensions().outputs < 2 {
-            continue;
-        }
-        let te = plant.sample_time;
+    let draw = |_| {
+        let mut design = random_plants::with_several_sensors(&mut dice);
+        let te = design.plant.sample_time;
         design.scenario.steps = 4000;
         let (mut at, mut schedule) = (0.0, Vec::new());
         while at < design.scenario.steps as f64 {
@@ -84,9 +78,9 @@ fn designs(seed: u64, count: usize) -> Vec<Design> {
         design.scenario.schedule = schedule;
         let settings = design.controller.estimator.hypotheses.as_mut().unwrap();
         settings.mode_rate = Some(1.0 / MODE_LENGTH);
-        found.push(design);
-    }
-    found
+        design
+    };
+    (0..count).map(draw).collect()
 }
 
 /// By how much a loop may get worse when it is told the mode one sample late: beyond it, a mode that has

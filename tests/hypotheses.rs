@@ -6,7 +6,6 @@ mod common;
 mod random_plants;
 
 use common::{Channel, REFERENCES, plant, reference, scenario, state_based};
-use ftc_control::parameters::EstimatorMethod;
 use ftc_control::{Controller, ControllerState};
 use ftc_design::Design;
 use ftc_plant::scenario::{ModeInterval, Waveform};
@@ -20,23 +19,19 @@ const STEPS: u64 = 1200;
 /// Random designs with at least two sensors, on a schedule with switches.
 fn designs(seed: u64, count: usize) -> Vec<Design> {
     let mut dice = Dice::seeded(seed);
-    let mut found = Vec::new();
-    while found.len() < count {
-        let mut design = random_plants::design_with(&mut dice, EstimatorMethod::Observer);
-        let plant = &design.plant;
-        if plant.dimensions().outputs < 2 {
-            continue;
-        }
+    let draw = |_| {
+        let mut design = random_plants::with_several_sensors(&mut dice);
+        let te = design.plant.sample_time;
         design.scenario.steps = STEPS;
         design.scenario.schedule = (0..6)
             .map(|at| ModeInterval {
-                from: 200.0 * at as f64 * plant.sample_time,
+                from: 200.0 * at as f64 * te,
                 mode: at % 2,
             })
             .collect();
-        found.push(design);
-    }
-    found
+        design
+    };
+    (0..count).map(draw).collect()
 }
 
 fn simulate(design: &Design, truth: &SwitchedPlant, variant: Variant) -> Trajectory {

@@ -56,6 +56,16 @@ pub fn design(dice: &mut Dice) -> Design {
     design_with(dice, EstimatorMethod::Reference)
 }
 
+/// The same with the state-based estimator and at least two sensors.
+pub fn with_several_sensors(dice: &mut Dice) -> Design {
+    loop {
+        let design = design_with(dice, EstimatorMethod::Observer);
+        if design.plant.dimensions().outputs > 1 {
+            return design;
+        }
+    }
+}
+
 /// The same with an estimator of one's choice.
 pub fn design_with(dice: &mut Dice, method: EstimatorMethod) -> Design {
     loop {

@@ -181,9 +181,10 @@ impl Controller {
     }
 
     /// What a tick is told: its number `tick` counted from the start time, the active `mode` (0-based;
-    /// of no account where the design [finds it](Self::finds_the_mode)), the `measurement` (p; a value that is not finite is a fault of that sensor) and the `reference`
-    /// (r). Judged by the design's thresholds, and corrected by the fault estimate, unless
-    /// [`Sample::with_thresholds`] and [`Sample::compensating`] say otherwise.
+    /// of no account where the design [finds it](Self::finds_the_mode)), the `measurement` (p; a value
+    /// that is not finite is a fault of that sensor) and the `reference` (r). Judged by the design's
+    /// thresholds, and corrected by the fault estimate, unless [`Sample::with_thresholds`] and
+    /// [`Sample::compensating`] say otherwise.
     ///
     /// # Errors
     /// A vector of another length, or a mode that does not exist.

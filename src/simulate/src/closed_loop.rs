@@ -36,6 +36,11 @@ impl Variant {
             Self::Predictive => "mpc",
         }
     }
+
+    /// Whether a controller that would find the mode from the readings is told it, as what it is compared with.
+    const fn is_told_the_mode(self) -> bool {
+        matches!(self, Self::NoFtc | Self::ToldTheFault)
+    }
 }
 
 /// What closes the loop: from the plant's outputs to a command.
@@ -132,6 +137,22 @@ struct Tolerant<'a> {
     variant: Variant,
 }
 
+impl<'a> Tolerant<'a> {
+    /// At rest in the mode in which the plant begins.
+    fn new(plant: &PlantSimulator, controller: &'a Controller, variant: Variant) -> Self {
+        Self {
+            controller,
+            state: controller.initial_state(plant.initial_state().mode),
+            variant,
+        }
+    }
+
+    /// Whether its command acts one tick later.
+    fn is_delayed(&self) -> bool {
+        self.controller.parameters().feedback.latency > 0
+    }
+}
+
 impl Regulator for Tolerant<'_> {
     fn tick(&mut self, seen: &PlantState) {
         let compensate = match self.variant {
@@ -144,9 +165,9 @@ impl Regulator for Tolerant<'_> {
             .sample(seen.tick, seen.told, &seen.y, &seen.reference)
             .and_then(|sample| sample.compensating(compensate))
             .expect("plant and controller have the same sizes");
-        let sample = match self.variant {
-            Variant::NoFtc | Variant::ToldTheFault => sample.telling_the_mode(),
-            _ => sample,
+        let sample = match self.variant.is_told_the_mode() {
+            true => sample.telling_the_mode(),
+            false => sample,
         };
         self.controller.tick(&mut self.state, &sample);
     }
@@ -162,9 +183,9 @@ impl Regulator for Tolerant<'_> {
             fault: &estimator.fault,
             residual: &estimator.residual,
             flagged: &estimator.flagged,
-            mode: match self.variant {
-                Variant::NoFtc | Variant::ToldTheFault => None,
-                _ => self.controller.found_mode(&self.state),
+            mode: match self.variant.is_told_the_mode() {
+                true => None,
+                false => self.controller.found_mode(&self.state),
             },
         }
     }
@@ -173,18 +194,9 @@ impl Regulator for Tolerant<'_> {
 /// Runs the scenario once with the tolerant controller. With latency 1 the command computed at a
 /// tick acts from the next tick on, as it does when a master steps both FMUs in parallel.
 pub fn run(plant: &PlantSimulator, controller: &Controller, variant: Variant) -> Trajectory {
-    let state = controller.initial_state(plant.initial_state().mode);
-    let delayed = controller.parameters().feedback.latency > 0;
-    run_with(
-        plant,
-        &mut Tolerant {
-            controller,
-            state,
-            variant,
-        },
-        variant,
-        delayed,
-    )
+    let mut regulator = Tolerant::new(plant, controller, variant);
+    let delayed = regulator.is_delayed();
+    run_with(plant, &mut regulator, variant, delayed)
 }
 
 /// One sample of a running loop.
@@ -207,12 +219,8 @@ pub fn visit(
     variant: Variant,
     mut visit: impl FnMut(&Seen<'_>),
 ) -> Option<u64> {
-    let mut regulator = Tolerant {
-        controller,
-        state: controller.initial_state(plant.initial_state().mode),
-        variant,
-    };
-    let delayed = controller.parameters().feedback.latency > 0;
+    let mut regulator = Tolerant::new(plant, controller, variant);
+    let delayed = regulator.is_delayed();
     drive(plant, &mut regulator, delayed, |state, regulator| {
         visit(&Seen {
             plant: state,
@@ -313,12 +321,8 @@ impl<'a> Loop<'a> {
         controller: &'a Controller,
         variant: Variant,
     ) -> Self {
-        let tolerant = Tolerant {
-            controller,
-            state: controller.initial_state(plant.initial_state().mode),
-            variant,
-        };
-        let delayed = controller.parameters().feedback.latency > 0;
+        let tolerant = Tolerant::new(plant, controller, variant);
+        let delayed = tolerant.is_delayed();
         Self::new(plant, Box::new(tolerant), delayed)
     }
 

@@ -37,7 +37,7 @@ pub fn runs(points: &[Point], columns: usize) -> Vec<Vec<Point>> {
             found.push(Vec::new());
         }
         if let Some(run) = found.last_mut() {
-            run.extend(extremes(bucket));
+            run.extend(with_extremes(bucket, std::iter::empty()));
         }
         open = bucket.last().is_some_and(is_finite);
         rest = tail;
@@ -99,17 +99,8 @@ impl Thinned {
 
 /// Both ends of a stretch (a gap there remains a gap), its smallest and its largest finite point.
 fn outline(stretch: &[Point]) -> impl Iterator<Item = Point> {
-    let by_value = |a: &usize, b: &usize| stretch[*a][1].total_cmp(&stretch[*b][1]);
-    let finite = || (0..stretch.len()).filter(|&at| is_finite(&stretch[at]));
     let ends = (!stretch.is_empty()).then(|| [0, stretch.len() - 1]);
-    let inner = finite()
-        .min_by(by_value)
-        .into_iter()
-        .chain(finite().max_by(by_value));
-    let mut kept: Vec<usize> = ends.into_iter().flatten().chain(inner).collect();
-    kept.sort_unstable();
-    kept.dedup();
-    kept.into_iter().map(|at| stretch[at])
+    with_extremes(stretch, ends.into_iter().flatten())
 }
 
 fn is_finite(point: &Point) -> bool {
@@ -124,21 +115,18 @@ fn split(points: &[Point]) -> Vec<Vec<Point>> {
         .collect()
 }
 
-/// The smallest and the largest finite point of a bucket in the order they occur; one if they are the same.
-fn extremes(bucket: &[Point]) -> impl Iterator<Item = Point> {
-    let by_value = |a: &(usize, &Point), b: &(usize, &Point)| a.1[1].total_cmp(&b.1[1]);
-    let finite = || {
-        bucket
-            .iter()
-            .enumerate()
-            .filter(|(_, point)| is_finite(point))
-    };
-    let low = finite().min_by(by_value);
-    let high = finite().max_by(by_value);
-    let mut kept: Vec<(usize, &Point)> = low.into_iter().chain(high).collect();
-    kept.sort_by_key(|(index, _)| *index);
-    kept.dedup_by_key(|(index, _)| *index);
-    kept.into_iter().map(|(_, point)| *point)
+/// The points at these positions, the smallest and the largest finite one, in the order they occur, each once.
+fn with_extremes(
+    points: &[Point],
+    positions: impl Iterator<Item = usize>,
+) -> impl Iterator<Item = Point> {
+    let by_value = |a: &usize, b: &usize| points[*a][1].total_cmp(&points[*b][1]);
+    let finite = || (0..points.len()).filter(|&at| is_finite(&points[at]));
+    let (low, high) = (finite().min_by(by_value), finite().max_by(by_value));
+    let mut kept: Vec<usize> = positions.chain(low).chain(high).collect();
+    kept.sort_unstable();
+    kept.dedup();
+    kept.into_iter().map(|at| points[at])
 }
 
 fn keep_ends(found: &mut [Vec<Point>], first: Point, last: Point) {
