@@ -21,6 +21,8 @@ use std::time::{Duration, Instant};
 
 /// Name of the result that merges.
 const RESULT: &str = "campaign.json";
+/// The largest that is read, in bytes: it holds counts, however many runs there were.
+const LARGEST_RESULT: u64 = 256 << 20;
 /// Name of the page.
 const PAGE: &str = "campaign.html";
 /// Name of the file with a row per run.
@@ -181,8 +183,9 @@ fn merge(design: &Design, arguments: &Arguments) -> Result<Partial, Failure> {
 }
 
 fn read(path: &Path) -> Result<Partial, Failure> {
-    let text = std::fs::read_to_string(path)
-        .map_err(|error| format!("cannot be read ({error}): check the path"));
+    let text = ftc_tables::read_regular(path, LARGEST_RESULT)
+        .map_err(|error| error.to_string())
+        .map(|bytes| String::from_utf8_lossy(&bytes).into_owned());
     text.and_then(|text| campaign::page::read(&text).map_err(|error| error.to_string()))
         .map_err(|what| Failure::Input(format!("{}: {what}", path.display())))
 }
