@@ -76,7 +76,8 @@ def identify(
     for number, log in enumerate(logs, 1):
         if not isinstance(log, Log):
             raise DesignFileError(
-                f"log {number} is of type {type(log).__name__}: give an ftc_fmu.Log, as Log.from_dataframe makes", "logs"
+                f"log {number} is of type {type(log).__name__}: give an ftc_fmu.Log, as Log.from_dataframe makes",
+                "logs",
             )
     order = None if order is None else whole(order, "order", 1)
     if not logs:

@@ -211,7 +211,7 @@ def _rate(t: np.ndarray | None, said: float | None) -> float:
     found = _sample_time(t)
     if said is not None and abs(found - said) > DRIFT * said:
         raise DesignFileError(
-            f"the rows are {found:.6g} s apart on average, sample_time is {said:.6g}: give that of the log, or leave it out",
+            f"the rows are {found:.6g} s apart on average, sample_time is {said:.6g}: give the log's, or none",
             "sample_time",
         )
     return found if said is None else said

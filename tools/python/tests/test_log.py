@@ -108,8 +108,16 @@ def test_what_a_log_may_not_be(change: object, says: str) -> None:
     ("change", "options", "says"),
     [
         (lambda frame: frame.assign(level="1,5"), {"time": "t"}, 'column "level" holds what is no number'),
-        (lambda frame: frame.assign(gear=1.5), {"time": "t", "mode": "gear"}, 'column "gear", row 1 is 1.5: give a whole'),
-        (lambda frame: frame.assign(gear="a"), {"time": "t", "mode": "gear"}, "row 1 is 'a': give a whole number from 1"),
+        (
+            lambda frame: frame.assign(gear=1.5),
+            {"time": "t", "mode": "gear"},
+            'column "gear", row 1 is 1.5: give a whole',
+        ),
+        (
+            lambda frame: frame.assign(gear="a"),
+            {"time": "t", "mode": "gear"},
+            "row 1 is 'a': give a whole number from 1",
+        ),
         (lambda frame: frame.assign(gear=np.nan), {"time": "t", "mode": "gear"}, "row 1 is nan: give a whole number"),
         (lambda frame: frame.drop(columns="t"), {}, "no column tells the time"),
         (lambda frame: frame.rename(columns={"t": "Time [fortnights]"}), {}, "whose unit is not known"),
@@ -148,7 +156,7 @@ def test_the_time_of_a_data_frame_is_found() -> None:
 def test_an_order_is_a_whole_number(order: object) -> None:
     """Of at least one state."""
     log = ftc.Log.from_arrays(np.sin(np.arange(200.0)), np.arange(200.0), 1.0)
-    with pytest.raises(ftc.DesignFileError, match="order is .*: give a whole number from 1 on"):
+    with pytest.raises(ftc.DesignFileError, match=r"order is .*: give a whole number from 1 on"):
         ftc.Plant.identify(log, order=order)
     with pytest.raises(ftc.DesignFileError, match="log 1 is of type ndarray"):
         ftc.Plant.identify(np.zeros((200, 2)))
