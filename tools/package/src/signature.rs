@@ -261,6 +261,7 @@ fn compare(listed: &[u8], found: &str) -> Result<(), String> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use std::fs;
     use minisign::KeyPair;
 
     fn key_files(folder: &Path, name: &str, password: Option<&str>) -> [PathBuf; 2] {
