@@ -261,8 +261,8 @@ fn compare(listed: &[u8], found: &str) -> Result<(), String> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use std::fs;
     use minisign::KeyPair;
+    use std::fs;
 
     fn key_files(folder: &Path, name: &str, password: Option<&str>) -> [PathBuf; 2] {
         let paths = [
@@ -384,9 +384,12 @@ mod tests {
     fn files_that_are_no_keys_are_refused_by_name() {
         let folder = tempfile::tempdir().unwrap();
         let [secret, public] = key_files(folder.path(), "own", None);
-        for path in [&folder.path().join("none"), &public] {
+        for (path, word) in [
+            (&folder.path().join("none"), "check the path"),
+            (&public, "minisign"),
+        ] {
             let sentence = SigningKey::read(path).unwrap_err().to_string();
-            assert!(sentence.contains("minisign"), "{sentence}");
+            assert!(sentence.contains(word), "{sentence}");
         }
         let sentence = VerifyingKey::read(&secret)
             .map(|_| ())
