@@ -210,7 +210,7 @@ fn work(design: &Design, arguments: &Arguments, quiet: bool) -> Result<(Partial,
             .map_err(|error| Failure::Input(format!("--resume: {error}")))?;
     }
     let watch = Arc::new(Watch::default());
-    listen(&watch);
+    crate::interrupt::stop(&watch);
     let range = arguments.range(asked)?;
     let missing = whole.missing(range.clone());
     let count = missing.iter().map(|range| range.end - range.start).sum();
@@ -245,15 +245,6 @@ fn work(design: &Design, arguments: &Arguments, quiet: bool) -> Result<(Partial,
 }
 
 /// An interrupt stops the campaign and keeps what is done; a second one ends the program.
-fn listen(watch: &Arc<Watch>) {
-    let watch = Arc::clone(watch);
-    // Where no handler can be set, an interrupt ends the program as it always did.
-    let _ = ctrlc::set_handler(move || {
-        if watch.stop.swap(true, Ordering::Relaxed) {
-            std::process::exit(130);
-        }
-    });
-}
 
 /// The Parquet file, under another name until it is complete.
 struct Rows {
