@@ -106,7 +106,7 @@ bench: build $(VENV)/ready
 
 # Fuzzing needs a C++ compiler; each of TARGETS runs for SECONDS, ABREAST of them side by side.
 SECONDS ?= 30
-TARGETS ?= controller_calls plant_calls controller_design plant_design state location archive
+TARGETS ?= controller_calls plant_calls controller_design plant_design state location archive certificate
 ABREAST ?= 1
 FUZZ := env -u CARGO_ENCODED_RUSTFLAGS RUSTC_BOOTSTRAP=1 PATH="$(TOOLS)/bin:$$PATH" cargo fuzz
 IN_FUZZ := --fuzz-dir fmu/fuzz --target-dir target/fuzz
