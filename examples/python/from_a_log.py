@@ -20,7 +20,7 @@ import ftc_fmu as ftc
 HERE = Path(__file__).resolve().parent
 EXAMPLES = HERE if (HERE / "logged.toml").exists() else HERE.parent
 WATER = {"period": 600.0}  # s: the building's water consumption, which nobody measures
-FAULT = 3.0  # cm, of the first level sensor while it lies
+FAULT = 3.0  # cm, bias of the first level sensor
 
 
 def logs() -> list[ftc.Log]:
@@ -43,8 +43,8 @@ def try_on_the_plant(design: ftc.Design) -> np.ndarray:
         x0, u0, y0 = (np.array(mode["operating_point"][key]) for key in "xuy")
         y = C @ (x - x0) + y0
         errors.append(y - reference)
-        lie = np.array([FAULT, 0.0]) if 100 <= k < 200 or 450 <= k < 550 else np.zeros(2)
-        u = controller.step(y + lie + 0.05 * random.normal(size=2), reference, number)
+        bias = np.array([FAULT, 0.0]) if 100 <= k < 200 or 450 <= k < 550 else np.zeros(2)
+        u = controller.step(y + bias + 0.05 * random.normal(size=2), reference, number)
         x = x0 + A @ (x - x0) + B @ (u - u0)
     return np.array(errors)
 
@@ -72,7 +72,7 @@ def main() -> None:
     print(design)
     errors = np.abs(try_on_the_plant(design))
     settled = np.r_[50:300, 350:600]
-    print(f"largest true error on the plant itself, while a sensor lies by {FAULT} cm: {errors[settled].max():.2f} cm")
+    print(f"largest true error on the plant itself, while a sensor is off by {FAULT} cm: {errors[settled].max():.2f} cm")
     if errors[settled].max() > FAULT / 3.0:
         raise SystemExit("the controller follows the lying sensor")
     for path in design.export(arguments.out):

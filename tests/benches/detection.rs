@@ -149,7 +149,7 @@ fn main() {
         tally.false_alarms, tally.healthy_samples
     );
     println!(
-        "| fault | drawn | found | mean delay (samples) | worst delay | samples in which another sensor was accused |"
+        "| fault | drawn | found | mean delay (samples) | worst delay | samples in which another sensor was flagged |"
     );
     println!("|---|---|---|---|---|---|");
     for (name, drawn, found, sum, worst, accused) in &tally.kinds {

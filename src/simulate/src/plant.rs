@@ -103,7 +103,7 @@ impl<'a> External<'a> {
     }
 }
 
-/// The plant at one tick, with every signal an outside observer may see.
+/// The plant at one tick, with every signal that can be observed from outside.
 #[derive(Debug, PartialEq, Serialize, Deserialize)]
 pub struct PlantState {
     /// Tick this state belongs to.

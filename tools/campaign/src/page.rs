@@ -238,7 +238,7 @@ fn healthy(statistics: &Statistics) -> Section {
             quantiles("with, over without", &healthy.over_none),
         ],
         notes: vec![format!(
-            "Of {} runs without a fault {} had a sensor accused, and in {} the true error was more than 1 % larger than \
+            "Of {} runs without a fault {} had a false alarm, and in {} the true error was more than 1 % larger than \
              without fault tolerance.",
             healthy.runs, healthy.accused, healthy.worse_than_none
         )],

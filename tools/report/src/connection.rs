@@ -182,8 +182,8 @@ pub fn section(design: &Design, side: Side) -> Section {
             &[
                 (
                     "ftc_enabled",
-                    "Tunable. True: faults that are found are taken out of the loop. False: the controller believes \
-                     its sensors; faults are still estimated and flagged.",
+                    "Tunable. True: faults that are found are taken out of the loop. False: the controller uses \
+                     the readings as they are; faults are still estimated and flagged.",
                 ),
                 (
                     "threshold",
@@ -197,7 +197,7 @@ pub fn section(design: &Design, side: Side) -> Section {
             &[
                 (
                     "scenario_enabled",
-                    "Fixed. True: the plant plays the design's references, modes, faults and disturbance. False: \
+                    "Fixed. True: the plant runs the design's scenario: references, modes, faults and disturbance. False: \
                      these are zero, and mode_ext is the mode.",
                 ),
                 (

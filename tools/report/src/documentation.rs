@@ -64,7 +64,7 @@ fn extent(design: &Design) -> String {
         format!("all {steps} samples")
     };
     format!(
-        "The experiment that the plant FMU plays ({part}), simulated when this FMU was made: what the plant \
+        "The scenario that the plant FMU runs ({part}), simulated when this FMU was made: what the plant \
          really does with and without fault-tolerant control (FTC)."
     )
 }

@@ -155,12 +155,12 @@ fn observer(design: &Design) -> Vec<(String, String)> {
     lines
 }
 
-/// Whom the estimator believes where a slow divergence could be a drift or a load.
+/// What the estimator trusts where a slow divergence could be a drift or a load.
 fn ambiguous(settings: &Hypotheses) -> &'static str {
     if settings.trusts_model() {
-        "the model is believed"
+        "the model is trusted, a drift is taken out"
     } else {
-        "the sensors are believed, suspect is raised"
+        "the sensors are trusted, suspect is raised"
     }
 }
 

@@ -259,7 +259,7 @@ fn check_sizes(
     require(&[
         (
             !lost.is_empty() && lost.iter().all(listed) && distinct,
-            "the gains for lost sensors are not one per mode, blind to the lost sensors",
+            "the gains for lost sensors are not one per mode, zero for the lost sensors",
         ),
         (
             sized && (lists.len() == 1 || lists.len() == members),

@@ -69,8 +69,8 @@ pub struct Predictive {
     estimate: DVector<f64>,
     offset: DVector<f64>,
     command: Vec<f64>,
-    silent: Vec<f64>,
-    calm: Vec<bool>,
+    no_fault: Vec<f64>,
+    no_flag: Vec<bool>,
     late: bool,
 }
 
@@ -144,8 +144,8 @@ impl Predictive {
             estimate: DVector::from_column_slice(&point.x),
             offset: DVector::zeros(dims.outputs),
             command: point.u.clone(),
-            silent: vec![0.0; dims.outputs],
-            calm: vec![false; dims.outputs],
+            no_fault: vec![0.0; dims.outputs],
+            no_flag: vec![false; dims.outputs],
             late: false,
         })
     }
@@ -219,9 +219,9 @@ impl Regulator for Predictive {
     fn report(&self) -> Report<'_> {
         Report {
             estimate: self.estimate.as_slice(),
-            fault: &self.silent,
+            fault: &self.no_fault,
             residual: self.offset.as_slice(),
-            flagged: &self.calm,
+            flagged: &self.no_flag,
             mode: None,
         }
     }

@@ -1,6 +1,6 @@
 //! How the outputs follow small changes of the inputs.
 //!
-//! The mode, the scenario's own signals, a sensor that is silent and a state at its bound do not
+//! The mode, the scenario's own signals, a sensor whose reading is lost and a state at its bound do not
 //! move. A sensor that is stuck keeps what it read last, and so the change of that.
 
 use super::rectifier;
@@ -139,17 +139,17 @@ fn differentiate_sensor<'a>(
     last: &mut f64,
 ) -> (f64, f64) {
     let mut reading = healthy + added;
-    let (mut struck, mut silent) = (false, false);
+    let (mut struck, mut lost) = (false, false);
     for event in events {
         struck = true;
         match event.kind {
             FaultKind::Bias { .. } | FaultKind::Drift { .. } | FaultKind::Intermittent { .. } => {}
             FaultKind::GainLoss { loss } => reading *= 1.0 - loss,
-            FaultKind::Stuck => (reading, silent) = (*last, false),
-            FaultKind::Dropout => silent = true,
+            FaultKind::Stuck => (reading, lost) = (*last, false),
+            FaultKind::Dropout => lost = true,
         }
     }
-    if silent {
+    if lost {
         return (0.0, 0.0);
     }
     if !struck {

@@ -3,7 +3,7 @@
 use ftc_plant::scenario::{FaultEvent, Scenario, Waveform, first_tick};
 use std::ops::Range;
 
-/// What a scenario plays, and when.
+/// Which mode, faults and loads a scenario has at each tick.
 #[derive(Clone, Debug)]
 pub(super) struct Schedule {
     /// Reference per tracked output (r).

@@ -181,7 +181,7 @@ fn lead(design: &Design, runs: &[Digest]) -> String {
         "sensors"
     };
     sentences.push(format!(
-        "During part of it, the {noun} {} did not tell the truth.",
+        "During part of it, the {noun} {} had a fault.",
         list(&faulty)
     ));
     if let Some((without, against_told)) = ratios(design, runs) {

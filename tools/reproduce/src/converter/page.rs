@@ -209,7 +209,7 @@ fn table_2(trials: &[Trial]) -> Table {
         ],
         rows: rows.collect(),
         notes: vec![
-            "Measured, the two may change places: whoever believes a faulty sensor makes its reading follow the reference. \
+            "Measured, the two may change places: a controller that uses a faulty reading makes that reading follow the reference. \
              Samples without a reading are left out of the measured figures."
                 .into(),
         ],
@@ -266,8 +266,8 @@ fn notes(trials: &[Trial]) -> Vec<String> {
     let level = names(|lead, noise| lead.abs() <= noise);
     if !level.is_empty() {
         notes.push(format!(
-            "Level, by less than the noise of the sensor is worth: {}. A sensor that gives no number cannot lie, the model \
-             of the current is exact, and both reach a new reference in the one sample that nobody can save.",
+            "Level, by less than the noise of the sensor is worth: {}. A lost reading misleads no controller, the model \
+             of the current is exact, and both reach a new reference in the one sample that no controller can save.",
             level.join("; ")
         ));
     }

@@ -215,7 +215,7 @@ fn estimation(record: &Record) -> Claim {
             range(record, ControllerKind::AdditiveReference),
             aligned(record.worst_over_told(ControllerKind::Proposed), 4)
         ),
-        "the loop feeds the printed window inputs that already answer to the fault; the healthy database does not depend on them",
+        "the loop feeds the printed window inputs that the fault has already changed; the healthy database does not depend on them",
     )
 }
 
