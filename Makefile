@@ -13,15 +13,16 @@ TOOLS := $(CURDIR)/target/tools
 
 .PHONY: build fmu-linux64 fmu-all wheel test-wheel compare-platforms test test-rust test-python browser demo bench fuzz soak memcheck threadcheck lint package clean
 
-# The program, and the FMU binaries by themselves with the profile meant for them: built with the
-# whole workspace they would carry the solver's symbols along. No path of this machine is in them.
-# PROGRAM may say more than the program alone, as `.ci/run` does.
+# No path of this machine in what is built; the same flags everywhere, so that nothing is compiled twice.
+export CARGO_ENCODED_RUSTFLAGS := $(shell tools/platforms/remap.sh)
+
+# The program, and the FMU binaries by themselves: built with the whole workspace they would carry the
+# solver's symbols along. PROGRAM may say more than the program alone, as `.ci/run` does.
 PROGRAM ?= --package ftc-fmu
 
 build:
 	cargo build --release $(PROGRAM)
-	CARGO_ENCODED_RUSTFLAGS="$$(tools/platforms/remap.sh)" \
-		cargo build --profile fmu --package ftc-controller-fmu --package ftc-plant-fmu
+	cargo build --release --config tools/platforms/fmu.toml --package ftc-controller-fmu --package ftc-plant-fmu
 	tools/platforms/native.sh
 
 # FMU binaries beyond those for this machine; `ftc-fmu export` packs whatever is built and is not
@@ -105,9 +106,9 @@ bench: build $(VENV)/ready
 
 # Fuzzing needs a C++ compiler; each of TARGETS runs for SECONDS, ABREAST of them side by side.
 SECONDS ?= 30
-TARGETS ?= controller_calls plant_calls controller_design plant_design state location archive
+TARGETS ?= controller_calls plant_calls controller_design plant_design state location archive certificate
 ABREAST ?= 1
-FUZZ := RUSTC_BOOTSTRAP=1 PATH="$(TOOLS)/bin:$$PATH" cargo fuzz
+FUZZ := env -u CARGO_ENCODED_RUSTFLAGS RUSTC_BOOTSTRAP=1 PATH="$(TOOLS)/bin:$$PATH" cargo fuzz
 IN_FUZZ := --fuzz-dir fmu/fuzz --target-dir target/fuzz
 
 fuzz: $(TOOLS)/$(FUZZER)
@@ -151,7 +152,7 @@ LIBRARIES := ftc-plant ftc-control ftc-lapack ftc-design ftc-simulate ftc-identi
 package:
 	rm -rf target/packaged
 	rm -rf $(LIBRARIES:%="$${CARGO_HOME:-$$HOME/.cargo}"/registry/src/-*/%-[0-9]*)
-	CARGO_PROFILE_DEV_DEBUG=0 cargo package --quiet --allow-dirty --target-dir target/packaged $(LIBRARIES:%=--package %)
+	CARGO_PROFILE_DEV_DEBUG=0 CARGO_PROFILE_DEV_OPT_LEVEL=0 cargo package --quiet --allow-dirty --target-dir target/packaged $(LIBRARIES:%=--package %)
 
 clean:
 	cargo clean

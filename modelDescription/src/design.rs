@@ -1,7 +1,9 @@
 //! The design as an FMU carries it, and what the tables need of it.
 
 use crate::{Interface, SignalInfo};
-use ftc_design::{Design, RecordError, Signal};
+use ftc_design::{ControllerDesign, Design, RecordError, Signal, Signals};
+use ftc_plant::{Scenario, SwitchedPlant, TruePlant};
+use serde::Deserialize;
 
 /// Name of the design in an FMU's `resources` folder: MessagePack, the record as a map of its fields.
 pub const DESIGN_FILE: &str = "design.msgpack";
@@ -33,12 +35,41 @@ pub fn write_design(design: &Design) -> Result<Vec<u8>, DesignFileError> {
     Ok(rmp_serde::to_vec_named(&running)?)
 }
 
+/// [`Design`] without its proof: reading that, too, would be half of the code of a binary.
+#[derive(Deserialize)]
+struct Running {
+    format: u32,
+    name: String,
+    signals: Signals,
+    plant: SwitchedPlant,
+    controller: ControllerDesign,
+    #[serde(default)]
+    true_plant: TruePlant,
+    scenario: Scenario,
+}
+
+impl From<Running> for Design {
+    fn from(read: Running) -> Self {
+        let mut design = Self::new(
+            &read.name,
+            read.plant,
+            read.signals,
+            read.controller,
+            read.scenario,
+        );
+        design.format = read.format;
+        design.true_plant = read.true_plant;
+        design
+    }
+}
+
 /// Reads the bytes of [`DESIGN_FILE`] and checks that all sizes agree.
 ///
 /// # Errors
 /// Bytes that hold no design, or one whose sizes do not agree.
 pub fn read_design(bytes: &[u8]) -> Result<Design, DesignFileError> {
-    let design: Design = rmp_serde::from_slice(bytes)?;
+    let running: Running = rmp_serde::from_slice(bytes)?;
+    let design = Design::from(running);
     design.check()?;
     Ok(design)
 }

@@ -49,8 +49,9 @@ def test_what_is_refused_is_heard_with_logging_off(
 ) -> None:
     """FMPy leaves logging off and prints what it hears: the sentence is there, with the variable's name."""
     with fmu_loop.slave(example_case("paper").fmus.controller, "controller") as controller:
-        with pytest.raises(Exception, match="status 3"):
-            controller.set("threshold", np.array([-1.0, 0.1]))
+        for bad in (-1.0, np.inf):
+            with pytest.raises(Exception, match="status 3"):
+                controller.set("threshold", np.array([bad, 0.1]))
         controller.set("mode", np.array([1]))
         controller.initialize(0.0)
         controller.set("mode_real", np.array([2.0]))
@@ -59,7 +60,8 @@ def test_what_is_refused_is_heard_with_logging_off(
         controller.set("mode_real", np.array([0.0]))
         controller.step(0.0, 1.0)
     heard = capfd.readouterr().out
-    assert "threshold[1] is -1, outside its range from 0 to inf" in heard
+    assert "threshold[1] is -1: give a finite number from 0 on" in heard
+    assert "threshold[1] is inf: give a finite number from 0 on" in heard
     assert "mode is 1, but mode_real is 2" in heard
 
 

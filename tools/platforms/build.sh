@@ -10,7 +10,7 @@
 set -euo pipefail
 cd "$(dirname "$0")/../.."
 
-packages=(--package ftc-controller-fmu --package ftc-plant-fmu --lib --profile fmu)
+packages=(--package ftc-controller-fmu --package ftc-plant-fmu --lib --release --config tools/platforms/fmu.toml)
 
 has_library_for() {
     [ -d "$("${RUSTC:-rustc}" --print target-libdir --target "$1")" ]
@@ -22,7 +22,7 @@ build() {
     shift 2
     if has_library_for "$target"; then
         CARGO_ENCODED_RUSTFLAGS=$(tools/platforms/remap.sh "${linking[@]}") "$@" "${packages[@]}" --target "$target$glibc"
-        built=target/$target/fmu
+        built=target/$target/release
         return
     fi
     RUSTC=$(tools/platforms/toolchain.sh "$target")
@@ -35,7 +35,7 @@ build() {
     CARGO_ENCODED_RUSTFLAGS=$(tools/platforms/remap.sh "${linking[@]}") \
         "$@" "${packages[@]}" --target "$target$glibc" --target-dir target/platforms/build "${standard[@]}"
     unset RUSTC RUSTC_BOOTSTRAP
-    built=target/platforms/build/$target/fmu
+    built=target/platforms/build/$target/release
 }
 
 # pack PLATFORM PREFIX EXTENSION: copies what was built to where the exporter looks

@@ -14,8 +14,6 @@ folder=target/release/fmu-binaries/$platform
 mkdir -p "$folder"
 for name in ftc_controller ftc_plant; do
     library=lib${name}_fmu.so
-    # Beside the program: by its date the exporter tells which other platforms' binaries are outdated.
-    cp "target/fmu/$library" "target/release/$library"
-    cp --update "target/fmu/$library" "$folder/$name.so"
+    cp --update "target/release/$library" "$folder/$name.so"
     touch "$folder/$name.so"
 done

@@ -4,6 +4,9 @@
 set -euo pipefail
 cd "$(dirname "$0")/../.."
 
+# The folder of sources has a name only once something is in it.
+compgen -G "${CARGO_HOME:-$HOME/.cargo}/registry/src/[!-]*/" >/dev/null || cargo fetch --quiet --locked >&2
+
 flags=("$@" "--remap-path-prefix=$PWD/=")
 # Without the folders, named "-...", that cargo package leaves there: other flags build everything anew,
 # and what was built last is what is exported.

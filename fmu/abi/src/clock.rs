@@ -80,7 +80,9 @@ pub enum TimeError {
     #[error("communicationStepSize is {0}: give a positive number of seconds")]
     Step(f64),
     /// A step does not begin where the last one ended.
-    #[error("currentCommunicationPoint is {from}, but the last step ended at {last}")]
+    #[error(
+        "currentCommunicationPoint is {from}, but the last step ended at {last}: begin the step there"
+    )]
     Point {
         /// Where it begins.
         from: f64,
@@ -88,7 +90,9 @@ pub enum TimeError {
         last: f64,
     },
     /// A step leads beyond the stop time.
-    #[error("the step ends at {to}, after stopTime {stop}")]
+    #[error(
+        "the step ends at {to}, after stopTime {stop}: end it there, or set up the experiment without a stop time"
+    )]
     BeyondStop {
         /// Where it ends.
         to: f64,

@@ -336,11 +336,15 @@ impl<S: Slave> Component<S> {
             }
             let value = convert(value);
             if let Some((min, max)) = access.range
-                && !(min..=max).contains(&value)
+                && !(value.is_finite() && (min..=max).contains(&value))
             {
+                let advice = match max.is_finite() {
+                    true => format!("from {min} to {max}"),
+                    false => format!("from {min} on"),
+                };
                 let name = self.name(reference);
                 return Err(Failure::error(format!(
-                    "{name} is {value}, outside its range from {min} to {max}"
+                    "{name} is {value}: give a finite number {advice}"
                 )));
             }
         }
@@ -691,10 +695,15 @@ fn address<T>(saved: &Saved<T>) -> usize {
     &raw const **saved as usize
 }
 
+/// A number of six digits, for a sentence.
+fn shortened(value: f64) -> f64 {
+    format!("{value:.5e}").parse().unwrap_or(value)
+}
+
 /// The warning that a tick ran on inputs from before it began.
 fn late_inputs(before: &Clock, k: u64, length: f64) -> String {
     let te = before.sample_time();
-    let (from, age) = (before.now(), before.until(k) * te);
+    let (from, age) = (before.now(), shortened(before.until(k) * te));
     format!(
         "in the step of {length} s from {from} s a tick began {age} s after the inputs were set, \
          and ran on these old inputs: the sample time is {te} s, make steps of just that, or of a \

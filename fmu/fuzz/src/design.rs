@@ -70,12 +70,18 @@ fn edit(text: &mut String, edit: &Edit) {
     }
 }
 
-/// The bytes of the edited design; none where the JSON is no design any more.
-fn edited(edits: &[Edit]) -> Option<Vec<u8>> {
-    let mut text = UNCHANGED.clone();
+/// JSON with these changes; bytes of it are not replaced.
+pub(crate) fn edited_text(text: &str, edits: &[Edit]) -> String {
+    let mut text = text.to_string();
     for change in edits {
         edit(&mut text, change);
     }
+    text
+}
+
+/// The bytes of the edited design; none where the JSON is no design any more.
+fn edited(edits: &[Edit]) -> Option<Vec<u8>> {
+    let text = edited_text(&UNCHANGED, edits);
     let design = serde_json::from_str(&text).ok()?;
     let mut bytes = write_design(&design).ok()?;
     for change in edits {

@@ -185,6 +185,9 @@ pub enum Error {
         /// Number, from 1.
         number: usize,
     },
+    /// A model without states.
+    #[error("an order of 0 leaves no state: ask for at least 1")]
+    NoState,
     /// No model of any order could be computed.
     #[error(
         "no model of order {order} explains the log: excite the inputs more, or ask for another order"
@@ -203,6 +206,9 @@ const SAME_FIT: f64 = 0.5;
 /// # Errors
 /// [`Error`] where the logs hold too little.
 pub fn identify(logs: &[Log], settings: &Settings) -> Result<Identified, Error> {
+    if settings.order == Some(0) {
+        return Err(Error::NoState);
+    }
     let data = data::Data::prepare(logs, &settings.periods)?;
     let parts: Vec<data::Split> = data.modes.iter().map(data::ModeData::split).collect();
     let tried = try_orders(&data, &parts, settings);

@@ -316,6 +316,14 @@ fn what_a_log_lacks_is_said() {
         number: 1,
     };
     assert_eq!(refused(&[log(200, false)]), still);
+    let none = Settings {
+        order: Some(0),
+        ..Settings::default()
+    };
+    assert_eq!(
+        identify(&[log(200, true)], &none).unwrap_err(),
+        Error::NoState
+    );
     let mut broken = log(200, true);
     broken.outputs[(11, 0)] = f64::NAN;
     assert_eq!(refused(&[broken]), Error::NotFinite { log: 1, row: 12 });

@@ -58,7 +58,7 @@ pub enum PlantError {
     },
     /// A part of an operating point has the wrong length.
     #[error(
-        "mode {mode}: operating_point.{part} has {found} entries, but the plant needs {needed}"
+        "mode {mode}: operating_point.{part} has {found} entries: give the {needed} that the plant needs"
     )]
     OperatingPointLength {
         /// The mode.

@@ -422,18 +422,21 @@ pub fn json(whole: &Partial, asked: u64) -> Value {
     })
 }
 
-/// What a program printed by [`json()`], read back.
+/// What a program printed by [`json()`], read back, and the number of runs that were asked for.
 ///
 /// # Errors
 /// A text that is no such thing; reads as the end of a sentence that begins with the file's name.
-pub fn read(text: &str) -> Result<Partial, ReadError> {
+pub fn read(text: &str) -> Result<(Partial, u64), ReadError> {
     let value: Value = serde_json::from_str(text)?;
     let whole = value.get("campaign").cloned().unwrap_or_default();
     let known = whole.is_object();
-    serde_json::from_value(whole).map_err(|error| match known {
+    let whole: Partial = serde_json::from_value(whole).map_err(|error| match known {
         true => ReadError::Other(error),
         false => ReadError::No(error),
-    })
+    })?;
+    let asked = value.get("asked").and_then(Value::as_u64);
+    let asked = asked.unwrap_or(whole.statistics.runs);
+    Ok((whole, asked))
 }
 
 /// What was read is no result of a campaign, or one of another version.

@@ -175,7 +175,7 @@ fn the_page_and_the_json_hold_the_numbers() {
     assert!(page.contains("campaign of 40 runs") && page.contains("40 of the 50 runs"));
     assert!(!page.contains("<script"));
     let json = campaign::page::json(whole(), 50).to_string();
-    assert_eq!(&campaign::page::read(&json).unwrap(), whole());
+    assert_eq!(campaign::page::read(&json).unwrap(), (whole().clone(), 50));
     assert!(campaign::page::read("{}").is_err());
 }
 

@@ -21,10 +21,14 @@ use std::time::{Duration, Instant};
 
 /// Name of the result that merges.
 const RESULT: &str = "campaign.json";
+/// The largest that is read, in bytes: it holds counts, however many runs there were.
+const LARGEST_RESULT: u64 = 256 << 20;
 /// Name of the page.
 const PAGE: &str = "campaign.html";
 /// Name of the file with a row per run.
 const ROWS: &str = "runs.parquet";
+/// Runs of a campaign, where nobody says.
+const RUNS: u64 = 1000;
 /// How often a sign of life is printed where there is no terminal.
 const LINE_EVERY: Duration = Duration::from_secs(10);
 
@@ -36,9 +40,10 @@ pub struct Arguments {
     /// Directory to write to; made if it does not exist.
     #[arg(long, value_name = "DIR")]
     out: PathBuf,
-    /// Number of runs of the whole campaign.
-    #[arg(long, default_value_t = 1000, value_parser = clap::value_parser!(u64).range(1..=1_000_000_000))]
-    runs: u64,
+    /// Number of runs of the whole campaign: 1000 if left out; with --merge and --resume as many as
+    /// were asked for before.
+    #[arg(long, value_parser = clap::value_parser!(u64).range(1..=1_000_000_000))]
+    runs: Option<u64>,
     /// Seed: the same one gives the same runs.
     #[arg(long, default_value_t = 1)]
     seed: u64,
@@ -105,10 +110,16 @@ impl Arguments {
         options
     }
 
-    /// The runs to be done, apart from those that are done already.
-    fn range(&self) -> Range<u64> {
+    /// The runs to be done, apart from those that are done already; `before` is how many an earlier call
+    /// was asked for.
+    fn range(&self, before: Option<u64>) -> Result<Range<u64>, Failure> {
+        if self.runs.is_none() && self.shard.is_some() && before.is_some() {
+            let what = "--resume with --shard: give --runs of the whole campaign, too";
+            return Err(Failure::Input(what.into()));
+        }
+        let runs = self.runs.or(before).unwrap_or(RUNS);
         let (index, count) = self.shard.unwrap_or((1, 1));
-        campaign::shard(self.runs, index, count)
+        Ok(campaign::shard(runs, index, count))
     }
 }
 
@@ -128,13 +139,8 @@ pub fn run(
     }
     drop(progress);
     let design = &made.design;
-    let range = arguments.range();
-    let asked = match arguments.merge.is_empty() {
-        true => range.end - range.start,
-        false => arguments.runs,
-    };
-    let whole = match arguments.merge.is_empty() {
-        true => work(design, arguments, range, quiet)?,
+    let (whole, asked) = match arguments.merge.is_empty() {
+        true => work(design, arguments, quiet)?,
         false => merge(design, arguments)?,
     };
     let staging = Staging::new(&arguments.out).map_err(Failure::output_directory)?;
@@ -149,7 +155,7 @@ pub fn run(
     staging.commit().map_err(Failure::output_directory)?;
     let mut warnings = made.warnings;
     warnings.extend(campaign::page::unstable(&made.design, &whole).map(small));
-    Ok(summary(&whole, asked, &arguments.out) + &report::warnings::text(&warnings))
+    Ok(summary(&whole, asked, arguments) + &report::warnings::text(&warnings))
 }
 
 /// A run of the campaign, sample by sample.
@@ -166,44 +172,47 @@ fn replay(
 }
 
 /// Reads the results of shards and puts them together.
-fn merge(design: &Design, arguments: &Arguments) -> Result<Partial, Failure> {
-    let parts: Result<Vec<Partial>, Failure> =
+fn merge(design: &Design, arguments: &Arguments) -> Result<(Partial, u64), Failure> {
+    let parts: Result<Vec<(Partial, u64)>, Failure> =
         arguments.merge.iter().map(|path| read(path)).collect();
+    let (parts, asked): (Vec<Partial>, Vec<u64>) = parts?.into_iter().unzip();
+    let together = asked
+        .iter()
+        .fold(0, |sum: u64, &runs| sum.saturating_add(runs));
     let whole =
-        campaign::merge(parts?).map_err(|error| Failure::Input(format!("--merge: {error}")))?;
+        campaign::merge(parts).map_err(|error| Failure::Input(format!("--merge: {error}")))?;
     if whole.fingerprint != Partial::new(design, &whole.options).fingerprint {
         return Err(Failure::Input(format!(
             "--merge: the parts belong to another design than {}: name the design file they were made with",
             arguments.design.display()
         )));
     }
-    Ok(whole)
+    Ok((whole, arguments.runs.unwrap_or(together)))
 }
 
-fn read(path: &Path) -> Result<Partial, Failure> {
-    let text = std::fs::read_to_string(path)
-        .map_err(|error| format!("cannot be read ({error}): check the path"));
+fn read(path: &Path) -> Result<(Partial, u64), Failure> {
+    let text = ftc_tables::read_regular(path, LARGEST_RESULT)
+        .map_err(|error| error.to_string())
+        .map(|bytes| String::from_utf8_lossy(&bytes).into_owned());
     text.and_then(|text| campaign::page::read(&text).map_err(|error| error.to_string()))
         .map_err(|what| Failure::Input(format!("{}: {what}", path.display())))
 }
 
 /// Does the runs that are missing.
-fn work(
-    design: &Design,
-    arguments: &Arguments,
-    range: Range<u64>,
-    quiet: bool,
-) -> Result<Partial, Failure> {
+fn work(design: &Design, arguments: &Arguments, quiet: bool) -> Result<(Partial, u64), Failure> {
     let options = arguments.options();
     let mut whole = Partial::new(design, &options);
+    let mut asked = None;
     if arguments.resume {
-        let before = read(&arguments.out.join(RESULT))?;
+        let (before, runs) = read(&arguments.out.join(RESULT))?;
+        asked = Some(runs);
         whole = campaign::merge([whole, before])
             .map_err(|error| Failure::Input(format!("--resume: {error}")))?;
     }
     let watch = Arc::new(Watch::default());
-    listen(&watch);
-    let missing = whole.missing(range);
+    crate::interrupt::stop(&watch);
+    let range = arguments.range(asked)?;
+    let missing = whole.missing(range.clone());
     let count = missing.iter().map(|range| range.end - range.start).sum();
     let pool = rayon::ThreadPoolBuilder::new()
         .num_threads(arguments.jobs.map_or(0, usize::from))
@@ -232,19 +241,10 @@ fn work(
     if let Some(rows) = rows {
         rows.keep()?;
     }
-    Ok(whole)
+    Ok((whole, range.end - range.start))
 }
 
 /// An interrupt stops the campaign and keeps what is done; a second one ends the program.
-fn listen(watch: &Arc<Watch>) {
-    let watch = Arc::clone(watch);
-    // Where no handler can be set, an interrupt ends the program as it always did.
-    let _ = ctrlc::set_handler(move || {
-        if watch.stop.swap(true, Ordering::Relaxed) {
-            std::process::exit(130);
-        }
-    });
-}
 
 /// The Parquet file, under another name until it is complete.
 struct Rows {
@@ -353,7 +353,7 @@ fn lines(watch: &Watch, count: u64, over: &std::sync::atomic::AtomicBool) {
     }
 }
 
-fn summary(whole: &Partial, asked: u64, out: &Path) -> String {
+fn summary(whole: &Partial, asked: u64, arguments: &Arguments) -> String {
     let statistics = &whole.statistics;
     let mut text = format!(
         "{}: {} runs, of which {} without a fault\n\n{:<34}{:>12}{:>12}{:>12}{:>12}\n",
@@ -391,14 +391,18 @@ fn summary(whole: &Partial, asked: u64, out: &Path) -> String {
          wrote {} and {}",
         statistics.worse_than_none,
         statistics.faulty_runs,
-        out.join(PAGE).display(),
+        arguments.out.join(PAGE).display(),
         RESULT
     );
     if statistics.runs < asked {
         let _ = writeln!(
             text,
-            "warning: {} of {asked} runs were done: go on with --resume",
-            statistics.runs
+            "warning: {} of {asked} runs were done: {}",
+            statistics.runs,
+            match arguments.merge.is_empty() {
+                true => "go on with --resume",
+                false => "merge the other shards, too",
+            }
         );
     }
     text

@@ -17,6 +17,7 @@ mod estimate;
 pub mod examples;
 mod failure;
 mod identification;
+mod interrupt;
 mod progress;
 mod solved;
 
@@ -262,6 +263,7 @@ pub fn main(
             };
         }
     };
+    interrupt::listen();
     match run(&arguments, binaries, itself) {
         Ok(_) if arguments.quiet => DONE,
         Ok(text) => print(&text).map_or_else(unprinted, |()| DONE),

@@ -14,6 +14,9 @@ use sha2::{Digest, Sha256};
 use std::io::Write;
 use std::path::Path;
 
+/// The largest file that is read, in bytes.
+const LARGEST_DESIGN: u64 = 1 << 30;
+
 /// What stands in the file.
 #[derive(Deserialize, Serialize)]
 struct Solved {
@@ -63,8 +66,8 @@ pub fn load(path: &Path, key: &str) -> Result<Design, Failure> {
             path.display()
         ))
     };
-    let bytes =
-        std::fs::read(path).map_err(|error| refused(&format!("cannot be read ({error})")))?;
+    let bytes = ftc_tables::read_regular(path, LARGEST_DESIGN)
+        .map_err(|error| Failure::Input(format!("--solved {}: {error}", path.display())))?;
     let solved: Solved =
         serde_json::from_slice(&bytes).map_err(|_| refused("this is not a solved design"))?;
     if solved.key != key {

@@ -132,7 +132,7 @@ fn keys() {
             "key given twice",
             "sample_time = 1.0",
             "sample_time = 1.0\nsample_time = 2.0",
-            &["line 3", "duplicate key"],
+            &["line 3", "stands here again: give it once"],
         ),
     ]);
 }
@@ -1111,7 +1111,7 @@ fn keys_inside_kinds() {
             &[
                 "line",
                 "scenario.events[1]",
-                "the integer `3`, expected a table",
+                "a number, but must be a table",
             ],
         ),
         (
@@ -1196,7 +1196,7 @@ fn keys_inside_kinds() {
             "a scenario that is a number",
             "steps = 60",
             "steps = 60\nplant = 3",
-            &["scenario.plant", "expected a table"],
+            &["scenario.plant is a number", "write [scenario.plant]"],
         ),
         (
             "an actuator's fault of nothing",
@@ -1256,5 +1256,32 @@ fn an_unstable_mode_that_no_sensor_shows() {
             "{kind}: {message}"
         );
         assert!(!message.contains("use a luenberger"), "{kind}: {message}");
+    }
+}
+
+#[test]
+fn one_table_where_there_are_several_and_several_where_there_is_one() {
+    let cases: [(&str, &str, &str); 6] = [
+        (
+            "steps = 60",
+            "steps = 60\nsteps = 70",
+            "steps stands here again",
+        ),
+        (
+            "[compensation]",
+            "[observer]",
+            "observer stands here again: give it once",
+        ),
+        ("[[mode]]", "[mode]", "write [[mode]]"),
+        ("[controller]", "[[controller]]", "write [controller]"),
+        ("[scenario]", "[[scenario]]", "write [scenario]"),
+        (
+            "[controller]",
+            "[signals.inputs]\nname = \"a\"\n[controller]",
+            "write [[signals.inputs]]",
+        ),
+    ];
+    for (from, to, word) in cases {
+        refused(to, damaged(from, to), &["line ", "column ", word]);
     }
 }

@@ -298,6 +298,45 @@ fn only_regular_files_are_read() {
     }
 }
 
+/// Nor are keys, solved designs, results of campaigns and FMUs.
+#[test]
+#[cfg(unix)]
+fn other_files_must_be_regular_too() {
+    let bench = Bench::new(common::SOUND);
+    std::fs::create_dir(bench.path("out")).unwrap();
+    for name in ["pipe", "out/campaign.json"] {
+        let made = std::process::Command::new("mkfifo")
+            .arg(bench.path(name))
+            .status();
+        assert!(made.unwrap().success());
+    }
+    for file in ["pipe", "/dev/zero"] {
+        let cases: [&[&str]; 5] = [
+            &["verify", file],
+            &["verify", "x.fmu", "--key", file],
+            &["export", FILE, "--out", "to", "--sign", file],
+            &["simulate", FILE, "--out", "to", "--solved", file],
+            &["campaign", FILE, "--out", "to", "--merge", file],
+        ];
+        for arguments in cases {
+            not_regular(&bench, arguments, file);
+        }
+    }
+    let resume = ["campaign", FILE, "--runs", "4", "--out", "out", "--resume"];
+    not_regular(&bench, &resume, "campaign.json");
+}
+
+#[cfg(unix)]
+fn not_regular(bench: &Bench, arguments: &[&str], file: &str) {
+    let run = bench.run(arguments);
+    let message = run.stderr();
+    assert_eq!(run.code(), 2, "{arguments:?}: {message}");
+    assert!(
+        message.contains(file) && message.contains("no regular file"),
+        "{arguments:?}: {message}"
+    );
+}
+
 /// One damaged log: what is wrong, the first file, and words the sentence must have.
 type Case = (&'static str, String, &'static [&'static str]);
 

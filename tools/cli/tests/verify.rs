@@ -435,6 +435,15 @@ fn what_is_missing_or_no_fmu_of_ours() {
         assert!(run.stderr().contains(path), "{}", run.stderr());
         assert!(run.stderr().contains(word), "{}", run.stderr());
     }
+    let packed = Exported::made(Bench::new(SOUND), &["--ssp"]);
+    let run = packed.bench.run(&["verify", "out/sound.ssp"]);
+    assert_eq!(run.code(), 2);
+    assert!(
+        run.stderr()
+            .contains("an SSP package: name one of the FMUs in its resources"),
+        "{}",
+        run.stderr()
+    );
 }
 
 #[test]

@@ -37,6 +37,7 @@ mod notes;
 mod plant;
 pub mod schema;
 pub mod sentence;
+mod shape;
 mod signal;
 pub mod suggest;
 mod true_plant;
@@ -48,6 +49,7 @@ use notes::Notes;
 use schema::DesignFile;
 use std::io::Read;
 use std::path::Path;
+use toml::de::DeTable;
 use values::NameOrList;
 
 /// The largest design file that is read; long tables belong in CSV files.
@@ -93,9 +95,9 @@ pub fn parse(text: &str, folder: &Path) -> Result<Loaded, Error> {
 }
 
 fn deserialize(text: &str) -> Result<DesignFile, Error> {
-    let document =
-        toml::Deserializer::parse(text).map_err(|error| sentence::syntax(text, &error))?;
-    serde_path_to_error::deserialize(document)
+    let document = DeTable::parse(text).map_err(|error| sentence::syntax(text, &error))?;
+    shape::check(text, document.get_ref())?;
+    serde_path_to_error::deserialize(toml::Deserializer::from(document))
         .map_err(|error| sentence::mismatch(text, error.path(), error.inner()))
 }
 

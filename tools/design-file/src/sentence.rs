@@ -1,6 +1,6 @@
 //! One sentence for whatever a parser complains about.
 
-use crate::{Error, suggest};
+use crate::{Error, shape, suggest};
 use serde_path_to_error::{Path, Segment};
 
 /// Longest quotation from the user's file.
@@ -25,12 +25,23 @@ fn position(text: &str, offset: usize) -> String {
 
 /// A syntax error as one sentence.
 pub(crate) fn syntax(text: &str, error: &toml::de::Error) -> Error {
-    let at = error.span().map_or(0, |span| span.start);
-    let sentence = format!(
-        "{}: this is not TOML ({}): correct the syntax there",
-        position(text, at),
-        one_line(error.message())
-    );
+    let span = error.span().unwrap_or(0..0);
+    let at = span.start;
+    let place_words = position(text, at);
+    let key = text.get(span).unwrap_or_default();
+    let sentence = match error.message() {
+        "duplicate key" if !key.is_empty() => {
+            format!(
+                "{place_words}: {} stands here again: {}",
+                shorten(key),
+                shape::once(key)
+            )
+        }
+        message => format!(
+            "{place_words}: this is not TOML ({}): correct the syntax there",
+            one_line(message)
+        ),
+    };
     Error {
         line: Some(place(text, at).0),
         ..Error::of_file(sentence)
@@ -71,7 +82,11 @@ pub(crate) fn mismatch(text: &str, path: &Path, error: &toml::de::Error) -> Erro
             (table, what)
         }
         _ => {
-            let separator = if table.is_empty() { "" } else { ": " };
+            let separator = match table.chars().last() {
+                None => "",
+                Some(':') => " ",
+                Some(_) => ": ",
+            };
             let what = format!("{separator}{}: correct the value", plain_types(&message));
             (table, what)
         }

@@ -36,9 +36,11 @@ mod reading;
 mod replacement;
 pub mod signature;
 mod ssp;
+mod unfinished;
 mod verify;
 
 pub use error::Error;
 pub use export::{Exported, Options, Packed, export};
 pub use replacement::Replacement;
+pub use unfinished::abandon;
 pub use verify::{Checks, Verification, verify, verify_with};

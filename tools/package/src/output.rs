@@ -7,14 +7,12 @@
 //! it does anything else. A hidden directory is locked by the run that writes it, so that runs that
 //! ended are told from those that go on, and swept.
 
+use crate::unfinished::{self, HIDDEN, Unfinished};
 use std::ffi::{OsStr, OsString};
 use std::fs::{self, File};
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 use tempfile::TempDir;
-
-/// How hidden directories begin.
-const HIDDEN: &str = ".ftc-fmu-";
 
 /// The hidden directory whose files are complete.
 const READY: &str = ".ftc-fmu-ready";
@@ -44,6 +42,7 @@ pub struct Staging {
     _lock: File,
     /// Directories that were made for the output, innermost first.
     made: Vec<PathBuf>,
+    _unfinished: Unfinished,
 }
 
 impl Staging {
@@ -62,18 +61,22 @@ impl Staging {
             .collect();
         let prepare = || {
             fs::create_dir_all(out)?;
+            let _turn = unfinished::turn(out);
             recover(out)?;
             let temporary = tempfile::Builder::new().prefix(HIDDEN).tempdir_in(out)?;
             let lock = File::create(temporary.path().join(LOCK))?;
             lock.lock()?;
-            Ok((temporary, lock))
+            let mut paths = made.clone();
+            paths.push(temporary.path().to_path_buf());
+            Ok(((temporary, lock), paths))
         };
-        let (temporary, lock) = prepare().map_err(|error| {
+        let ((temporary, lock), unfinished) = Unfinished::make(prepare).map_err(|error| {
             remove(&made);
             blame(out, &error)
         })?;
         Ok(Self {
             out: out.to_path_buf(),
+            _unfinished: unfinished,
             temporary,
             _lock: lock,
             made,
@@ -121,6 +124,7 @@ impl Staging {
             self.check_way(name)?;
         }
         let ready = self.out.join(READY);
+        let _moving = unfinished::moving();
         let prepare = || {
             fs::create_dir(self.folder().join(ASIDE))?;
             flush(self.folder())?;
@@ -167,11 +171,15 @@ fn collected(folder: &Path) -> io::Result<Vec<OsString>> {
 }
 
 /// Finishes what runs that were killed had completed, and sweeps what they had not.
-fn recover(out: &Path) -> io::Result<()> {
+pub(crate) fn recover(out: &Path) -> io::Result<()> {
     for entry in fs::read_dir(out)? {
         let folder = entry?.path();
         let name = folder.file_name().unwrap_or_default();
-        if !name.to_string_lossy().starts_with(HIDDEN) || !folder.is_dir() {
+        if !name.to_string_lossy().starts_with(HIDDEN) {
+            continue;
+        }
+        if !folder.is_dir() {
+            unfinished::sweep(&folder)?;
             continue;
         }
         let lock = File::options().write(true).open(folder.join(LOCK));

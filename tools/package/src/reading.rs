@@ -53,6 +53,10 @@ pub(crate) fn files(
             .by_index(index)
             .map_err(|error| damaged(error.to_string()))?;
         let name = name(&entry, &mut file).map_err(damaged)?;
+        if name == "SystemStructure.ssd" {
+            let what = "this is an SSP package: name one of the FMUs in its resources, unpacked";
+            return Err(what.into());
+        }
         if !known(&name) {
             return Err(format!(
                 "{} is no part of an FMU of ours: export it again",

@@ -1,5 +1,7 @@
 //! One file that is written whole or not at all.
 
+use crate::output::recover;
+use crate::unfinished::{self, HIDDEN, Unfinished};
 use std::fs::File;
 use std::io;
 use std::path::{Path, PathBuf};
@@ -10,6 +12,7 @@ use tempfile::{Builder, NamedTempFile};
 pub struct Replacement {
     temporary: NamedTempFile,
     target: PathBuf,
+    _unfinished: Unfinished,
 }
 
 impl Replacement {
@@ -23,12 +26,23 @@ impl Replacement {
             _ => Path::new("."),
         };
         let mut builder = Builder::new();
-        builder.prefix(".ftc-fmu-");
+        builder.prefix(HIDDEN);
         // A result may be read by whoever may read other files of this user.
         #[cfg(unix)]
         builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o666));
+        let begin = || {
+            let _turn = unfinished::turn(folder);
+            // What cannot be swept is in nobody's way.
+            recover(folder).ok();
+            let temporary = builder.tempfile_in(folder)?;
+            temporary.as_file().lock()?;
+            let path = temporary.path().to_path_buf();
+            Ok((temporary, vec![path]))
+        };
+        let (temporary, unfinished) = Unfinished::make(begin)?;
         Ok(Self {
-            temporary: builder.tempfile_in(folder)?,
+            _unfinished: unfinished,
+            temporary,
             target: target.to_path_buf(),
         })
     }
@@ -52,6 +66,7 @@ impl Replacement {
     /// What the file system says; then the place is as it was.
     pub fn keep(self) -> io::Result<()> {
         self.temporary.as_file().sync_all()?;
+        let _moving = unfinished::moving();
         let kept = self.temporary.persist(&self.target);
         kept.map(drop).map_err(|error| error.error)
     }

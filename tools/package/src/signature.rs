@@ -12,7 +12,6 @@ use minisign::{PublicKey, PublicKeyBox, SecretKey, SecretKeyBox, SignatureBox};
 use sha2::{Digest, Sha256};
 use std::collections::BTreeMap;
 use std::fmt;
-use std::fs;
 use std::io::{Cursor, IsTerminal};
 use std::path::{Path, PathBuf};
 
@@ -119,6 +118,9 @@ impl fmt::Debug for SigningKey {
     }
 }
 
+/// A key file is a few lines.
+const LARGEST_KEY: u64 = 1 << 20;
+
 impl VerifyingKey {
     /// Reads a public key.
     ///
@@ -138,10 +140,13 @@ impl VerifyingKey {
 }
 
 fn text(path: &Path) -> Result<String, Error> {
-    fs::read_to_string(path).map_err(|error| Error::Key {
+    let refused = |what: String| Error::Key {
         file: path.into(),
-        what: format!("cannot be read ({error}): name a key file of minisign"),
-    })
+        what,
+    };
+    let bytes =
+        ftc_tables::read_regular(path, LARGEST_KEY).map_err(|why| refused(why.to_string()))?;
+    String::from_utf8(bytes).map_err(|_| refused("is no text: name a key file of minisign".into()))
 }
 
 fn no_key(error: &minisign::PError) -> String {
@@ -257,6 +262,7 @@ fn compare(listed: &[u8], found: &str) -> Result<(), String> {
 mod tests {
     use super::*;
     use minisign::KeyPair;
+    use std::fs;
 
     fn key_files(folder: &Path, name: &str, password: Option<&str>) -> [PathBuf; 2] {
         let paths = [
@@ -378,9 +384,12 @@ mod tests {
     fn files_that_are_no_keys_are_refused_by_name() {
         let folder = tempfile::tempdir().unwrap();
         let [secret, public] = key_files(folder.path(), "own", None);
-        for path in [&folder.path().join("none"), &public] {
+        for (path, word) in [
+            (&folder.path().join("none"), "check the path"),
+            (&public, "minisign"),
+        ] {
             let sentence = SigningKey::read(path).unwrap_err().to_string();
-            assert!(sentence.contains("minisign"), "{sentence}");
+            assert!(sentence.contains(word), "{sentence}");
         }
         let sentence = VerifyingKey::read(&secret)
             .map(|_| ())

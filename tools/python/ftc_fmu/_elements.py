@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ftc_fmu._plain import real
 from ftc_fmu.errors import DesignFileError
 
 if TYPE_CHECKING:
@@ -65,7 +66,7 @@ class Elements:
             DesignFileError: The FMU has no such variable.
         """
         found: list[str] = []
-        for name in given:
+        for name in [given] if isinstance(given, str) else given:
             if name in self._elements:
                 found.append(name)
             elif name in self._arrays:
@@ -85,7 +86,9 @@ class Elements:
         found: dict[str, float] = {}
         for name, value in values.items():
             names = self.names([name])
-            flat = np.asarray(value).reshape(-1)
+            flat = real(value, name).reshape(-1)
+            if not np.isfinite(flat).all():
+                raise DesignFileError(f'"{name}" is {value}: give finite numbers', name)
             if len(flat) != len(names):
                 raise DesignFileError(f'"{name}" takes {len(names)} numbers, not {len(flat)}', name)
             found.update(zip(names, flat.tolist(), strict=True))

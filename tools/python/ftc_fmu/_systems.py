@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from ftc_fmu import _core
+from ftc_fmu._plain import real
 from ftc_fmu.errors import DesignFileError
 
 
@@ -35,7 +36,10 @@ class Matrices:
                 "give the continuous model, or the same sample time",
                 "sample_time",
             )
-        A, B = _core.discretise(self.A.tolist(), self.B.tolist(), sample_time)
+        try:
+            A, B = _core.discretise(self.A.tolist(), self.B.tolist(), sample_time)
+        except ValueError as error:
+            raise DesignFileError(f"{self.where}: {error}", "sample_time") from error
         n, m = self.B.shape
         return replace(self, A=np.array(A).reshape(n, n), B=np.array(B).reshape(n, m), dt=sample_time)
 
@@ -68,7 +72,8 @@ def matrices(system: Any, where: str, *, continuous: bool) -> Matrices:  # noqa:
     elif dt is None:
         dt = (0.0 if continuous else None) if labelled else 0.0
     labels = [_labels(system, kind) if labelled else None for kind in ("input", "output", "state")]
-    return _checked(Matrices(*(np.array(getattr(system, name), dtype=float) for name in "ABCD"), dt, where, *labels))
+    given = [real(getattr(system, name), name, f"{where}: ") for name in "ABCD"]
+    return _checked(Matrices(*given, dt, where, *labels))
 
 
 def _labels(system: Any, kind: str) -> list[str] | None:  # noqa: ANN401
@@ -84,24 +89,33 @@ def _from_arrays(system: tuple | list, where: str, *, continuous: bool) -> Matri
         raise DesignFileError(
             f"{where} has {len(system)} parts: give (A, B, C), (A, B, C, D) or (A, B, C, D, dt)", where
         )
-    A, B, C = (np.atleast_2d(np.array(part, dtype=float)) for part in system[:3])
+    A, B, C = (np.atleast_2d(real(part, name, f"{where}: ")) for part, name in zip(system[:3], "ABC", strict=True))
     n = len(A)
     if B.shape[0] != n and B.size == n:
         B = B.reshape(n, 1)
     given = system[3] if len(system) > 3 else None
-    D = np.zeros((len(C), B.shape[1])) if given is None else np.atleast_2d(np.array(given, dtype=float))
+    D = np.zeros((len(C), B.shape[1])) if given is None else np.atleast_2d(real(given, "D", f"{where}: "))
     if D.size == 1 and D.flat[0] == 0.0:
         D = np.zeros((len(C), B.shape[1]))
     dt = 0.0 if continuous else None
     if len(system) == 5:
-        dt = 0.0 if system[4] is None else float(system[4])
+        dt = 0.0 if system[4] is None else _sample_time(system[4], where)
     return Matrices(A, B, C, D, dt, where)
 
 
+def _sample_time(dt: object, where: str) -> float:
+    given = real(dt, "dt", f"{where}: ")
+    if given.ndim or not np.isfinite(given) or given < 0.0:
+        raise DesignFileError(f"{where}: dt is {dt}: give seconds, or 0 for a continuous model", "dt")
+    return float(given)
+
+
 def _checked(model: Matrices) -> Matrices:
-    n, m, p = model.A.shape[0], model.B.shape[1], model.C.shape[0]
+    n, m, p = model.A.shape[0], model.B.shape[-1], model.C.shape[0]
     for name, wanted in (("A", (n, n)), ("B", (n, m)), ("C", (p, n)), ("D", (p, m))):
         matrix = getattr(model, name)
+        if matrix.ndim != 2:
+            raise DesignFileError(f"{model.where}: {name} has {matrix.ndim} dimensions: give rows and columns", name)
         if matrix.shape != wanted:
             # What B and C should be besides is told by themselves, so a transposed one tells it wrongly.
             turned = {"B": matrix.shape[1] == n, "C": matrix.shape[0] == n, "D": matrix.T.shape == wanted}.get(name)

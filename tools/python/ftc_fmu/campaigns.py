@@ -7,8 +7,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ftc_fmu import _core
+from ftc_fmu._plain import plain, whole
 from ftc_fmu.design import Design, listener
-from ftc_fmu.errors import FtcError, extra
+from ftc_fmu.errors import DesignFileError, FtcError, extra
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -94,7 +95,9 @@ def campaign(
         DesignFileError: An option is out of range.
         FtcError: The cluster could not finish.
     """
-    said = json.dumps(options)
+    runs = whole(runs, "runs", 1)
+    jobs = None if jobs is None else whole(jobs, "jobs", 1)
+    said = json.dumps(plain(options, ""))
     if client is None:
         part = design.core.campaign(said, 0, runs, jobs, listener(progress))
         return Campaign(design, part, runs)
@@ -114,6 +117,8 @@ def _on_cluster(
     told: Callable[[str, float], None] | None,
 ) -> bytes:
     distributed = extra("distributed", "dask")
+    if not isinstance(client, distributed.Client):
+        raise DesignFileError(f"client is of type {type(client).__name__}: give a dask.distributed.Client", "client")
     design.core.campaign(options, 0, 0, 1, None)  # refuses options before anything is sent
     threads = max(1, sum(client.nthreads().values()))
     count = max(1, min(runs, SHARDS_PER_THREAD * threads))

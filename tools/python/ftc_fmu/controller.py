@@ -6,6 +6,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ftc_fmu._plain import real, whole
+
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
 
@@ -36,7 +38,7 @@ class Controller:
         Raises:
             ValueError: One sentence about a wrong size or mode.
         """
-        return np.array(self._core.step(_vector(y), _vector(y_ref), int(mode)))
+        return np.array(self._core.step(_vector(y, "y"), _vector(y_ref, "y_ref"), whole(mode, "mode", 0)))
 
     @property
     def u(self) -> np.ndarray:
@@ -84,12 +86,12 @@ class Controller:
 
     def reset(self, mode: int = 1) -> None:
         """Goes back to rest at the operating point of a mode (from 1)."""
-        self._core.reset(int(mode))
+        self._core.reset(whole(mode, "mode", 0))
 
     def copy(self) -> Controller:
         """Returns a controller in the same state, which goes its own way from here."""
         return Controller(self._core.copy())
 
 
-def _vector(values: ArrayLike) -> list[float]:
-    return np.atleast_1d(np.asarray(values, dtype=float)).ravel().tolist()
+def _vector(values: ArrayLike, name: str) -> list[float]:
+    return np.atleast_1d(real(values, name)).ravel().tolist()

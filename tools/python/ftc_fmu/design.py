@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 from ftc_fmu import _core
 from ftc_fmu._place import HOME
-from ftc_fmu._plain import plain, to_toml
+from ftc_fmu._plain import plain, table, to_toml, whole
 from ftc_fmu.controller import Controller
 from ftc_fmu.errors import DesignFileError
 from ftc_fmu.log import Log
@@ -130,7 +130,7 @@ class Design:
         """
         if fmi != "2.0":
             raise DesignFileError(f'fmi is "{fmi}": FMUs of version "2.0" are written, no other', "fmi")
-        wanted = None if platforms is None else list(platforms)
+        wanted = [platforms] if isinstance(platforms, str) else None if platforms is None else list(platforms)
         key = None if sign is None else str(Path(sign))
         return [Path(path) for path in self.core.export(str(Path(out)), HOME, ssp, wanted, key)]
 
@@ -187,17 +187,20 @@ def design(
         Infeasible: There is no such controller: `blocks` and `advice` say why and what to do.
         Uncertified: Gains were found but not proved.
     """
+    if not hasattr(plant, "document"):
+        raise DesignFileError(f"plant is of type {type(plant).__name__}: give an ftc_fmu.Plant", "plant")
     document: dict[str, Any] = {"name": name} | plant.document()
-    tables = {key: keys.pop(key) for key in SECTIONS if key in keys}
-    control = dict(keys.pop("controller", {})) | keys
+    given = {key: keys.pop(key) for key in SECTIONS if key in keys}
+    tables = {key: table(value, key) for key, value in given.items() if value is not None}
+    control = table(keys.pop("controller", {}), "controller") | keys
     if "tracked" in control:
         control["tracked"] = _tracked(control["tracked"], plant)
-    if tables.get("scenario") is not None:
+    if "scenario" in tables:
         tables["scenario"] = _scenario(tables["scenario"], plant.sample_time)
     folder, tables = _with_logs(tables)
     if control:
         document["controller"] = plain(control, "controller")
-    document |= {key: plain(dict(table), key) for key, table in tables.items() if table is not None}
+    document |= {key: plain(entries, key) for key, entries in tables.items()}
     core = _core.solve(to_toml(document), str(folder), None, listener(progress), threads)
     return Design(core, document, folder)
 
@@ -234,7 +237,7 @@ def listener(progress: Progress) -> Callable[[str, float], None] | None:
 
 def _scenario(given: Mapping[str, Any], sample_time: float) -> dict[str, Any]:
     """A scenario whose true plant is a table, also where it was given as a `Plant`."""
-    scenario = dict(given)
+    scenario = table(given, "scenario")
     truth = scenario.get("plant")
     if not hasattr(truth, "truth"):
         return scenario
@@ -258,13 +261,13 @@ def _tracked(given: Sequence[int | str], plant: Plant) -> list[int]:
                 f'controller.tracked names "{entry}", the outputs are {", ".join(named)}: name one of them',
                 "controller.tracked",
             )
-        numbers.append(named.index(entry) + 1 if isinstance(entry, str) else int(entry))
+        numbers.append(named.index(entry) + 1 if isinstance(entry, str) else whole(entry, "controller.tracked", 1))
     return numbers
 
 
 def _with_logs(tables: dict[str, Any]) -> tuple[Path, dict[str, Any]]:
     """Writes logs that are objects into a folder of their own and names them in the tables."""
-    estimator = tables.get("estimator") or {}
+    estimator = tables.get("estimator", {})
     database = estimator.get("database")
     logs = [database] if isinstance(database, Log) else database
     if not isinstance(logs, list | tuple) or not all(isinstance(log, Log) for log in logs):

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ftc_fmu import _core
+from ftc_fmu._plain import whole
 from ftc_fmu.errors import DesignFileError
 from ftc_fmu.log import Log
 from ftc_fmu.plant import Plant
@@ -71,7 +72,14 @@ def identify(
     Raises:
         DesignFileError: One sentence about what the logs lack.
     """
-    logs = [logs] if isinstance(logs, Log) else list(logs)
+    logs = list(logs) if isinstance(logs, list | tuple) else [logs]
+    for number, log in enumerate(logs, 1):
+        if not isinstance(log, Log):
+            raise DesignFileError(
+                f"log {number} is of type {type(log).__name__}: give an ftc_fmu.Log, as Log.from_dataframe makes",
+                "logs",
+            )
+    order = None if order is None else whole(order, "order", 1)
     if not logs:
         raise DesignFileError("there is no log: give at least one", "logs")
     first = logs[0]

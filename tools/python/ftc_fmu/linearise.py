@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import shutil
+import warnings
+from contextlib import suppress
 from ctypes import c_double
 from dataclasses import dataclass
 from pathlib import Path
@@ -12,6 +14,7 @@ from xml.etree import ElementTree as ET
 import numpy as np
 
 from ftc_fmu._elements import Element, Elements, labels, whole
+from ftc_fmu._plain import table
 from ftc_fmu.errors import DesignFileError, FtcError, extra
 from ftc_fmu.plant import Plant
 from ftc_fmu.sampled import SampledModel
@@ -24,6 +27,8 @@ if TYPE_CHECKING:
 STEP = 6e-6
 # A steady state is one whose derivatives are so small, relative to a perturbation's effect.
 STEADY = 1e-9
+# How far directional derivatives may be from differences, relative to the largest effect in their row.
+AGREEMENT = 1e-3
 MOST_ITERATIONS = 50
 
 
@@ -70,14 +75,23 @@ def from_fmu(
         MissingExtra: fmpy is not installed.
     """
     fmpy = extra("fmpy")
-    description = fmpy.read_model_description(str(path))
+    try:
+        description = fmpy.read_model_description(str(path))
+    except Exception as error:  # whatever zipfile, lxml and fmpy find in a file that is no FMU
+        raise DesignFileError(f"{path} cannot be read as an FMU ({error}): name an FMU (FMI 2 or 3)", "path") from error
     if description.fmiVersion.startswith("1"):
         raise DesignFileError(f"{path} is of FMI {description.fmiVersion}: export it as FMI 2 or 3", "path")
-    points = [dict(point) for point in operating_points] if operating_points else [{}]
+    points = [operating_points] if isinstance(operating_points, dict) else list(operating_points or [{}])
+    points = [table(point, f"operating_points[{number}]") for number, point in enumerate(points)]
     elements = Elements(description)
-    inputs, outputs = elements.names(inputs), elements.names(outputs)
-    disturbance_inputs = elements.names(disturbance_inputs)
+    inputs, outputs, disturbance_inputs = (elements.names(each) for each in (inputs, outputs, disturbance_inputs))
     states = elements.names(states) if states else None
+    for name in [*inputs, *disturbance_inputs]:
+        _check_input(elements[name].variable, name, sampled=description.modelExchange is None)
+    for key, named in (("inputs", [*inputs, *disturbance_inputs]), ("outputs", outputs)):
+        twice = [name for name in named if named.count(name) > 1]
+        if twice:
+            raise DesignFileError(f'{key}: "{twice[0]}" is named twice: name it once', key)
     points = [elements.assignments(point) for point in points]
     driven = [*inputs, *disturbance_inputs]
     if description.modelExchange is None and not states:
@@ -93,7 +107,7 @@ def from_fmu(
             timing = (sample_time, settle)
             found = [_sampled(source, point, list(states or []), *timing) for point in points]
     except fmpy.fmi1.FMICallException as error:
-        raise FtcError(f"{path}: the FMU refused a call ({error})") from error
+        raise FtcError(f"{path}: the FMU refused a call ({error}): see what it logged") from error
     finally:
         shutil.rmtree(folder, ignore_errors=True)
     commanded = len(inputs)
@@ -107,6 +121,17 @@ def from_fmu(
         operating_points=[{"x": x, "u": u[:commanded], "y": y} for _, (x, u, y) in found],
         names=names,
     )
+
+
+def _check_input(variable: Any, name: str, *, sampled: bool) -> None:  # noqa: ANN401
+    """Refuses what cannot be commanded while a model runs."""
+    tunable = sampled and variable.causality == "parameter" and variable.variability == "tunable"
+    if variable.causality != "input" and not tunable:
+        raise DesignFileError(
+            f'"{name}" is no input of the FMU (its causality is {variable.causality}): name inputs; what makes a mode, '
+            "such as a parameter, belongs into operating_points",
+            "inputs",
+        )
 
 
 @dataclass(frozen=True)
@@ -157,7 +182,10 @@ class _Instance:
     def __init__(self, source: _Source, kind: str) -> None:
         self.fmi3 = source.description.fmiVersion.startswith("3")
         self.elements = source.elements
-        self.fmu = source.fmpy.instantiate_fmu(source.folder, source.description, fmi_type=kind)
+        try:
+            self.fmu = source.fmpy.instantiate_fmu(source.folder, source.description, fmi_type=kind)
+        except Exception as error:  # a library that is missing, of another machine, or lacks a function
+            raise FtcError(f"the FMU's binary cannot be used on this machine ({error})") from error
 
     def initialise(self, values: Mapping[str, float]) -> None:
         if self.fmi3:
@@ -212,10 +240,10 @@ class _Instance:
         return {reference: list(self.fmu.getReal([reference])) for reference in whole(elements)}
 
     def free(self) -> None:
-        try:
+        # After a refused call some FMUs may not be terminated, and the refusal is what counts.
+        with suppress(Exception):
             self.fmu.terminate()
-        finally:
-            self.fmu.freeInstance()
+        self.fmu.freeInstance()
 
 
 class _Continuous(_Instance):
@@ -288,6 +316,8 @@ def _continuous(source: _Source, point: Mapping[str, float], *, steady: bool) ->
             x = _steady(evaluate, jacobian, x, u, STEP * sizes[:n])
         full = jacobian(x, u)
         y = evaluate(x, u)[n:]
+        if directional:
+            full = _trusted(full, _differences(evaluate, x, u, STEP * sizes), sizes, source.outputs)
     finally:
         model.free()
     if not np.isfinite(full).all():
@@ -327,6 +357,24 @@ def _differences(
         columns.append((above - below) / (high - low))
     evaluate(x, u)
     return np.array(columns).T
+
+
+def _trusted(directional: np.ndarray, differences: np.ndarray, sizes: np.ndarray, outputs: Sequence[str]) -> np.ndarray:
+    """The directional derivatives, or the differences where these contradict them: some FMUs forget outputs."""
+    effect = np.abs(differences * sizes)
+    known = np.isfinite(directional) & (
+        np.abs((directional - differences) * sizes) <= AGREEMENT * (1e-6 + effect.max(axis=1, initial=0.0))[:, None]
+    )
+    if known.all():
+        return directional
+    row = int(np.argmin(known.all(axis=1)))
+    at = row - (len(directional) - len(outputs))
+    what = f'the output "{outputs[at]}"' if at >= 0 else f"the derivative of state {row + 1}"
+    warnings.warn(
+        f"the FMU's directional derivatives of {what} are not those of its values: central differences are taken",
+        stacklevel=2,
+    )
+    return differences
 
 
 def _steady(

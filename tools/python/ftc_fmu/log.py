@@ -9,13 +9,19 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ftc_fmu.errors import DesignFileError
+from ftc_fmu import _core
+from ftc_fmu._plain import real, whole
+from ftc_fmu.errors import DesignFileError, extra
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Iterable, Sequence
     from os import PathLike
 
     import pandas as pd
+
+
+# How far a log's mean step may be from the sample time that is said, relative to it, as in files.
+DRIFT = 1e-3
 
 
 @dataclass(frozen=True)
@@ -51,8 +57,13 @@ class Log:
                 raise DesignFileError(
                     f"the log: row {row + 1}, {names[column]} is no number: leave such rows out, or fill them", key
                 )
-        if len(self.u) != len(self.y) or (self.mode is not None and len(self.mode) != len(self.y)):
-            raise DesignFileError(f"the log has {len(self.u)} rows of inputs and {len(self.y)} of outputs", "y")
+        modes = len(self.u) if self.mode is None else len(self.mode)
+        if not len(self.u) == len(self.y) == modes:
+            raise DesignFileError(
+                f"the log has {len(self.u)} rows of inputs, {len(self.y)} of outputs and {modes} of modes: "
+                "give one of each per sample",
+                "y",
+            )
 
     @classmethod
     def from_arrays(
@@ -66,7 +77,7 @@ class Log:
         outputs: Sequence[str] | None = None,
     ) -> Log:
         """Makes a log of arrays (samples x m) and (samples x p)."""
-        u, y = (np.asarray(values, dtype=float) for values in (u, y))
+        u, y = real(u, "u"), real(y, "y")
         u, y = (values[:, None] if values.ndim == 1 else values for values in (u, y))
         return cls(
             u,
@@ -74,7 +85,7 @@ class Log:
             list(inputs or (f"u[{number}]" for number in range(1, u.shape[1] + 1))),
             list(outputs or (f"y[{number}]" for number in range(1, y.shape[1] + 1))),
             float(sample_time),
-            None if mode is None else np.asarray(mode, dtype=int),
+            None if mode is None else _modes(mode, "mode"),
         )
 
     @classmethod
@@ -94,28 +105,31 @@ class Log:
             frame: One row per sample.
             inputs: Columns of the inputs.
             outputs: Columns of the outputs.
-            time: Column of the time, in seconds or as time stamps; the index by default.
+            time: Column of the time, as time stamps, or numbers in seconds or in the unit behind its name
+                (`Time [ms]`). By default the index where it is more than a row's number, else the column
+                that bears a usual name (`t`, `time`, `Time [s]`).
             mode: Column of the active mode, from 1; one mode throughout by default.
             sample_time: Seconds between two samples; from the time by default.
 
         Raises:
             DesignFileError: A column is missing, or the sampling is not even: which row, and by how much.
         """
+        if not hasattr(frame, "columns"):
+            raise DesignFileError(f"frame is of type {type(frame).__name__}: give a pandas.DataFrame", "frame")
+        inputs, outputs = ([names] if isinstance(names, str) else list(names) for names in (inputs, outputs))
         wanted = [*inputs, *outputs, *([time] if time else []), *([mode] if mode else [])]
         missing = [name for name in wanted if name not in frame.columns]
         if missing:
             known = ", ".join(map(str, frame.columns))
             raise DesignFileError(f'the data frame has no column "{missing[0]}": its columns are {known}', missing[0])
-        stamps = frame[time] if time else frame.index.to_series()
-        if sample_time is None:
-            sample_time = _sample_time(stamps)
+        sample_time = _rate(_seconds(frame, time, [*inputs, *outputs, mode]), sample_time)
         return cls(
-            frame[list(inputs)].to_numpy(dtype=float),
-            frame[list(outputs)].to_numpy(dtype=float),
+            _columns(frame, inputs),
+            _columns(frame, outputs),
             [str(name) for name in inputs],
             [str(name) for name in outputs],
-            float(sample_time),
-            frame[mode].to_numpy(dtype=int) if mode else None,
+            sample_time,
+            _modes(frame[mode], f'column "{mode}"') if mode else None,
         )
 
     def to_csv(self, path: str | PathLike[str]) -> Path:
@@ -135,16 +149,81 @@ class Log:
         return len(self.y)
 
 
-def _sample_time(stamps: pd.Series) -> float:
-    """The sample time of even time stamps (seconds or dates)."""
-    if stamps.dtype.kind in "Mm":
-        stamps = (stamps - stamps.iloc[0]).dt.total_seconds()
+def _columns(frame: pd.DataFrame, names: Sequence[str]) -> np.ndarray:
+    """Columns as numbers (rows x columns); NaN where a table has none."""
+    found = []
+    for name in names:
+        column = frame[name]
+        if column.ndim != 1:
+            raise DesignFileError(f'the data frame has two columns "{name}": rename one of them', name)
+        try:
+            found.append(column.to_numpy(dtype=float, na_value=np.nan))
+        except (TypeError, ValueError) as error:
+            raise DesignFileError(
+                f'column "{name}" holds what is no number ({error}): convert it; for decimal commas, '
+                'pandas.read_csv(..., decimal=",")',
+                name,
+            ) from error
+    return np.array(found).reshape(len(found), len(frame)).T
+
+
+def _modes(values: Iterable[object], where: str) -> np.ndarray:
+    """Modes of all samples, from 1."""
+    return np.array([whole(mode, f"{where}, row {row}", 1) for row, mode in enumerate(values, 1)], dtype=int)
+
+
+def _seconds(frame: pd.DataFrame, time: str | None, signals: Sequence[str | None]) -> np.ndarray | None:
+    """The time of each row in seconds; None where nothing tells it."""
+    pandas = extra("pandas")
+    names = [str(name) for name in frame.columns]
+    taken = [at for at, name in enumerate(frame.columns) if name in signals]
+    if time is None and not isinstance(frame.index, pandas.RangeIndex):
+        stamps, unit = frame.index.to_series(), 1.0
+    else:
+        found = _core.time_column(names, None if time is None else str(time), taken)
+        if found is None:
+            return None
+        stamps, unit = frame.iloc[:, found[0]], found[1]
     try:
-        t = stamps.to_numpy(dtype=float)
+        if stamps.dtype.kind not in "Mmiuf":
+            numbers = pandas.to_numeric(stamps, errors="coerce")
+            whole_column = not numbers.isna().any()
+            stamps = numbers if whole_column else pandas.to_datetime(stamps, format="ISO8601")
+        if stamps.dtype.kind in "Mm":
+            return (stamps - stamps.iloc[0]).dt.total_seconds().to_numpy(dtype=float)
+        return stamps.to_numpy(dtype=float) * unit
     except (TypeError, ValueError) as error:
         raise DesignFileError(f"the time column is no time ({error}): name another by time=", "time") from error
+
+
+def _rate(t: np.ndarray | None, said: float | None) -> float:
+    """The sample time: what the rows' times say, which must be what is said."""
+    if said is not None:
+        said = float(real(said, "sample_time"))
+        if not (np.isfinite(said) and said > 0.0):
+            raise DesignFileError(f"sample_time is {said}: give a positive number of seconds", "sample_time")
+    if t is None:
+        if said is None:
+            raise DesignFileError(
+                "no column tells the time: name one, time=..., or give sample_time=, in seconds", "time"
+            )
+        return said
+    found = _sample_time(t)
+    if said is not None and abs(found - said) > DRIFT * said:
+        raise DesignFileError(
+            f"the rows are {found:.6g} s apart on average, sample_time is {said:.6g}: give the log's, or none",
+            "sample_time",
+        )
+    return found if said is None else said
+
+
+def _sample_time(t: np.ndarray) -> float:
+    """The sample time of even times in seconds."""
     if len(t) < 2:
         raise DesignFileError(f"the log has {len(t)} rows: record more", "time")
+    if not np.isfinite(t).all():
+        row = int(np.argmin(np.isfinite(t))) + 1
+        raise DesignFileError(f"the time of row {row} is missing: leave the row out", "time")
     steps = np.diff(t)
     sample_time = float(np.median(steps))
     off = np.abs(steps - sample_time) > 0.05 * abs(sample_time)

@@ -2,17 +2,18 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ftc_fmu._plain import plain
+from ftc_fmu._plain import plain, real
 from ftc_fmu._systems import Matrices, matrices
 from ftc_fmu.errors import DesignFileError
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
+    from collections.abc import Sequence
     from os import PathLike
 
     from ftc_fmu.identification import Identification
@@ -178,6 +179,8 @@ class Plant:
                     f"disturbance_inputs names column {given}, B has columns 0 to {width - 1}: count as NumPy does",
                     "disturbance_inputs",
                 )
+        if len(set(columns)) < len(columns):
+            raise DesignFileError("disturbance_inputs names a column twice: name each once", "disturbance_inputs")
         return columns
 
     def _signals(self, first: Matrices, said: Mapping[str, Any]) -> dict[str, list[dict[str, Any]]]:
@@ -197,10 +200,7 @@ class Plant:
         for key, label in labels.items():
             entries = said[key] if said.get(key) is not None else label
             if entries:
-                tables[key] = [
-                    {"name": entry} if isinstance(entry, str) else plain(dict(entry), f"signals.{key}")
-                    for entry in entries
-                ]
+                tables[key] = [_signal(entry, f"signals.{key}[{number}]") for number, entry in enumerate(entries, 1)]
         return tables
 
     def truth(self) -> dict[str, Any]:
@@ -247,7 +247,15 @@ def _names(inputs: Sequence[str | Mapping[str, Any]] | None, width: int) -> list
     """Names of all columns of B, where there is an entry for each."""
     if inputs is None or len(inputs) != width:
         return None
-    return [entry if isinstance(entry, str) else str(entry.get("name", "")) for entry in inputs]
+    return [_signal(entry, f"signals.inputs[{number}]").get("name", "") for number, entry in enumerate(inputs, 1)]
+
+
+def _signal(entry: object, key: str) -> dict[str, Any]:
+    if isinstance(entry, str):
+        return {"name": entry}
+    if not isinstance(entry, Mapping):
+        raise DesignFileError(f'{key} is {entry!r}: give a name, or a dictionary such as {{"name": "..."}}', key)
+    return plain(dict(entry), key)
 
 
 def _operating_point(point: Mapping[str, Any]) -> OperatingPoint:
@@ -256,11 +264,14 @@ def _operating_point(point: Mapping[str, Any]) -> OperatingPoint:
         raise DesignFileError(
             f"operating_points: {', '.join(sorted(missing))} is missing: give x, u and y", "operating_points"
         )
-    return OperatingPoint(*(np.atleast_1d(np.asarray(point[key], dtype=float)) for key in "xuy"))
+    return OperatingPoint(*(np.atleast_1d(real(point[key], key, "operating_points: ")) for key in "xuy"))
 
 
 def _positive(value: float, key: str) -> float:
-    value = float(value)
+    try:
+        value = float(value)
+    except (TypeError, ValueError) as error:
+        raise DesignFileError(f"{key} is {value!r}: give a positive number of seconds", key) from error
     if not (np.isfinite(value) and value > 0.0):
         raise DesignFileError(f"{key} is {value}: give a positive number of seconds", key)
     return value

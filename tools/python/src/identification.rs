@@ -48,6 +48,19 @@ pub fn discretise(a: Rows, b: Rows, sample_time: f64) -> PyResult<(Rows, Rows)> 
     Ok((part(0, n), part(n, m)))
 }
 
+/// Which column tells the time, from 0, and the seconds of its unit; none where no name is a usual one.
+#[pyfunction]
+pub fn time_column(
+    py: Python<'_>,
+    names: Vec<String>,
+    said: Option<&str>,
+    taken: Vec<usize>,
+) -> PyResult<Option<(usize, f64)>> {
+    ftc_tables::find_time_column(&names, said, &taken)
+        .map(|found| found.map(|column| (column.index, column.seconds())))
+        .map_err(|error| errors::of_sentence(py, format!("the data frame {error}")))
+}
+
 /// Matrices A, B, C, then x0, u0, y0, then the fit per output, samples held out and used.
 type Found = (Rows, Rows, Rows, [Vec<f64>; 3], Vec<f64>, usize, usize);
 /// Order, orders tried with their fits, modes, how states were joined and the fit of that.

@@ -26,7 +26,7 @@ mod _core {
     #[pymodule_export]
     use super::design::{Design, read_text, restore, solve};
     #[pymodule_export]
-    use super::identification::{discretise, identify};
+    use super::identification::{discretise, identify, time_column};
     #[pymodule_export]
     use super::run::Run;
     #[pymodule_export]

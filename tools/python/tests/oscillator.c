@@ -3,7 +3,8 @@
  *     x1' = x2 + 0.2 w        y = x1 + 0.1 x2^2 + 0.05 w
  *     x2' = mu (1 - x1^2) x2 - x1^3 + u
  *
- * FMI 2 or 3 by -DFMI=2 or 3; with -DDERIVATIVES it gives directional derivatives. */
+ * FMI 2 or 3 by -DFMI=2 or 3; with -DDERIVATIVES it gives directional derivatives, with
+ * -DFORGETFUL those of the output are 0. */
 #include <stdlib.h>
 #if FMI == 2
 #include "fmi2Functions.h"
@@ -56,7 +57,9 @@ static Status directional(Handle c, const Reference *unknown, size_t nu, const R
     Real r[COUNT] = {0};
     r[DX1] = s[X2] + 0.2 * s[W];
     r[DX2] = (-2 * v[MU] * v[X1] * v[X2] - 3 * v[X1] * v[X1]) * s[X1] + v[MU] * (1 - v[X1] * v[X1]) * s[X2] + s[U];
+#ifndef FORGETFUL
     r[Y] = s[X1] + 0.2 * v[X2] * s[X2] + 0.05 * s[W];
+#endif
     for (size_t i = 0; i < nu; i++) out[i] = r[unknown[i]];
     return OK;
 }

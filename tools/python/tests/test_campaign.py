@@ -93,3 +93,8 @@ def test_an_option_that_is_unknown_or_out_of_range(paper: ftc.Design) -> None:
     """Is refused before anything is run."""
     with pytest.raises(ftc.DesignFileError, match="model_error is 2"):
         ftc.campaign(paper, runs=10, model_error=2.0)
+    for runs in (0, -1, 1.5, "many"):
+        with pytest.raises(ftc.DesignFileError, match=r"runs is .*: give a whole number from 1 on"):
+            ftc.campaign(paper, runs=runs)
+    with pytest.raises(ftc.DesignFileError, match=r"client is of type str: give a dask\.distributed\.Client"):
+        ftc.campaign(paper, runs=10, client="tcp://somewhere")

@@ -56,6 +56,10 @@ def test_a_reading_that_is_no_number_is_a_fault(paper: ftc.Design) -> None:
         (([0.1, 0.2], [0.5]), "y_ref has 1 values: give 2"),
         (([0.1, 0.2], [0.5, 0.5], 3), "mode is 3: give one of 1 to 2"),
         (([0.1, 0.2], [np.inf, 0.5]), "give a finite number"),
+        (([0.1, 0.2], [0.5, 0.5], 1.5), "mode is 1.5: give a whole number"),
+        (([0.1, 0.2], [0.5, 0.5], "closed"), "mode is 'closed': give a whole number"),
+        (("ab", [0.5, 0.5]), "y is no array of numbers"),
+        (([0.1, 0.2], [0.5j, 0.5]), "y_ref has complex entries"),
     ],
 )
 def test_wrong_sizes_are_refused(paper: ftc.Design, arguments: tuple, says: str) -> None:

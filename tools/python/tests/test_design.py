@@ -117,6 +117,29 @@ def test_an_unknown_key_is_named(tanks: ftc.Plant) -> None:
 
 
 @pytest.mark.parametrize(
+    ("keys", "key", "says"),
+    [
+        ({"estimator": "none"}, "estimator", "give a dictionary"),
+        ({"controller": [1]}, "controller", "give a dictionary"),
+        ({"scenario": "steps"}, "scenario", "give a dictionary"),
+        ({"scenario": {"events": {"kind": "stuck"}}}, "scenario.events", "must be a list of tables"),
+        ({"tracked": [1.5]}, "controller.tracked", "whole number"),
+    ],
+)
+def test_what_is_no_table_or_number_is_named(tanks: ftc.Plant, keys: dict, key: str, says: str) -> None:
+    """Before anything is solved."""
+    with pytest.raises(ftc.DesignFileError, match=says) as refused:
+        ftc.design(tanks, **keys)
+    assert refused.value.key == key
+
+
+def test_a_design_is_made_of_a_plant() -> None:
+    """Matrices alone are none."""
+    with pytest.raises(ftc.DesignFileError, match=r"plant is of type list: give an ftc_fmu\.Plant"):
+        ftc.design([([[0.5]], [[1.0]], [[1.0]])])
+
+
+@pytest.mark.parametrize(
     ("find", "put", "key"),
     [
         ("sample_time = 1.0", "sample_time = -1.0", "sample_time"),

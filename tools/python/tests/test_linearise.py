@@ -195,6 +195,56 @@ def test_wrong_names_are_refused(oscillator: Path) -> None:
         ftc.Plant.from_fmu(oscillator, ["U"], ["y"], sample_time=0.1)
 
 
+@pytest.mark.parametrize("version", [2, 3])
+def test_wrong_directional_derivatives_are_found_out(version: int, tmp_path: Path) -> None:
+    """Those of outputs are 0 in the Van der Pol oscillator of the Reference FMUs, whatever the output is."""
+    attribute = {2: "providesDirectionalDerivative", 3: "providesDirectionalDerivatives"}[version]
+    text = {2: FMI2, 3: FMI3}[version].format(derivatives=f'{attribute}="true"')
+    forgetful = made(tmp_path, "oscillator", version, text, ["-DDERIVATIVES", "-DFORGETFUL"])
+    with pytest.warns(UserWarning, match='directional derivatives of the output "y" are not those'):
+        found = ftc.Plant.from_fmu(forgetful, ["u"], ["y"], sample_time=0.1).modes[0]
+    (tmp_path / "sound").mkdir()
+    oscillator = made(tmp_path / "sound", "oscillator", version, text, ["-DDERIVATIVES"])
+    sound = ftc.Plant.from_fmu(oscillator, ["u"], ["y"], sample_time=0.1).modes[0]
+    for name in "ABC":
+        np.testing.assert_allclose(getattr(found, name), getattr(sound, name), atol=1e-8)
+
+
+def test_one_name_and_one_point_need_no_list(oscillator: Path) -> None:
+    """A text is one name, not its letters; a dictionary one point."""
+    plain = ftc.Plant.from_fmu(oscillator, "u", "y", {"u": 0.5}, sample_time=0.1)
+    listed = ftc.Plant.from_fmu(oscillator, ["u"], ["y"], [{"u": 0.5}], sample_time=0.1)
+    np.testing.assert_array_equal(plain.modes[0].A, listed.modes[0].A)
+
+
+@pytest.mark.parametrize(
+    ("inputs", "points", "says"),
+    [
+        (["y"], None, '"y" is no input of the FMU'),
+        (["u", "u"], None, '"u" is named twice'),
+        (["u"], [{"u": np.nan}], '"u" is nan: give finite numbers'),
+        (["u"], [{"u": "half"}], "u is no array of numbers"),
+        (["u"], ["half"], r"operating_points\[0\] is of type str: give a dictionary"),
+    ],
+)
+def test_what_is_no_input_or_point_is_refused(oscillator: Path, inputs: list, points: list | None, says: str) -> None:
+    """By name, before the FMU refuses a call."""
+    with pytest.raises(ftc.DesignFileError, match=says):
+        ftc.Plant.from_fmu(oscillator, inputs, ["y"], points, sample_time=0.1)
+
+
+def test_what_is_no_fmu_is_refused(oscillator: Path, tmp_path: Path) -> None:
+    """By its path: no archive, and an FMU without a binary for this machine."""
+    for path in (tmp_path / "none.fmu", Path(__file__)):
+        with pytest.raises(ftc.DesignFileError, match=f"{path.name} cannot be read as an FMU"):
+            ftc.Plant.from_fmu(path, ["u"], ["y"], sample_time=0.1)
+    bare = tmp_path / "bare.fmu"
+    with zipfile.ZipFile(oscillator) as whole, zipfile.ZipFile(bare, "w") as archive:
+        archive.writestr("modelDescription.xml", whole.read("modelDescription.xml"))
+    with pytest.raises(ftc.FtcError, match="binary cannot be used on this machine"):
+        ftc.Plant.from_fmu(bare, ["u"], ["y"], sample_time=0.1)
+
+
 @pytest.fixture(scope="module")
 def rectifier(tmp_path_factory: pytest.TempPathFactory) -> tuple[ftc.Design, Path]:
     """Our own nonlinear plant, for co-simulation, and the design it belongs to."""

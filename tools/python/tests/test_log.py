@@ -104,6 +104,64 @@ def test_what_a_log_may_not_be(change: object, says: str) -> None:
         ftc.Log.from_dataframe(change(frame), ["valve"], ["level"], time="t")
 
 
+@pytest.mark.parametrize(
+    ("change", "options", "says"),
+    [
+        (lambda frame: frame.assign(level="1,5"), {"time": "t"}, 'column "level" holds what is no number'),
+        (
+            lambda frame: frame.assign(gear=1.5),
+            {"time": "t", "mode": "gear"},
+            'column "gear", row 1 is 1.5: give a whole',
+        ),
+        (
+            lambda frame: frame.assign(gear="a"),
+            {"time": "t", "mode": "gear"},
+            "row 1 is 'a': give a whole number from 1",
+        ),
+        (lambda frame: frame.assign(gear=np.nan), {"time": "t", "mode": "gear"}, "row 1 is nan: give a whole number"),
+        (lambda frame: frame.drop(columns="t"), {}, "no column tells the time"),
+        (lambda frame: frame.rename(columns={"t": "Time [fortnights]"}), {}, "whose unit is not known"),
+        (lambda frame: frame.assign(time=frame["t"]), {}, "two columns that may be the time"),
+        (lambda frame: frame.assign(t=frame["t"] * 1.05), {"sample_time": 0.5}, "0.525 s apart on average"),
+        (lambda frame: frame.assign(t="yesterday"), {}, "the time column is no time"),
+        (lambda frame: frame.to_numpy(), {}, r"give a pandas\.DataFrame"),
+    ],
+)
+def test_what_a_data_frame_may_not_be(change: object, options: dict, says: str) -> None:
+    """Text for numbers, a mode that is none, a time that is not told or told twice."""
+    t = np.arange(100) * 0.5
+    frame = pd.DataFrame({"t": t, "valve": np.sin(t), "level": np.cos(t)})
+    with pytest.raises(ftc.DesignFileError, match=says):
+        ftc.Log.from_dataframe(change(frame), ["valve"], ["level"], **options)
+
+
+def test_the_time_of_a_data_frame_is_found() -> None:
+    """By the usual names, with their units; a column is not passed over for the numbers of rows."""
+    t = np.arange(100) * 0.5
+    signals = pd.DataFrame({"valve": np.sin(t), "level": np.cos(t)})
+    stamps = (pd.Timestamp("2024-01-01") + pd.to_timedelta(t, unit="s")).astype(str)
+    frames = [
+        signals.assign(**{"Time [s]": t}),
+        signals.assign(**{"time (ms)": 1000.0 * t}),
+        signals.assign(Timestamp=stamps),
+        signals.set_index(t),
+    ]
+    for frame in frames:
+        log = ftc.Log.from_dataframe(frame, "valve", "level")
+        assert log.sample_time == pytest.approx(0.5)
+    assert ftc.Log.from_dataframe(signals, "valve", "level", sample_time=2).sample_time == 2.0
+
+
+@pytest.mark.parametrize("order", [0, -1, 1.5, "two"])
+def test_an_order_is_a_whole_number(order: object) -> None:
+    """Of at least one state."""
+    log = ftc.Log.from_arrays(np.sin(np.arange(200.0)), np.arange(200.0), 1.0)
+    with pytest.raises(ftc.DesignFileError, match=r"order is .*: give a whole number from 1 on"):
+        ftc.Plant.identify(log, order=order)
+    with pytest.raises(ftc.DesignFileError, match="log 1 is of type ndarray"):
+        ftc.Plant.identify(np.zeros((200, 2)))
+
+
 def test_a_log_without_excitation_is_refused() -> None:
     """One sentence."""
     log = ftc.Log.from_arrays(np.ones((100, 1)), np.arange(100.0), 1.0)

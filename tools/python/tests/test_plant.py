@@ -78,6 +78,13 @@ def test_names_of_the_model_are_kept() -> None:
         (((A, B, C, D), -1.0), "sample_time", "positive"),
         (((A, [[0.0], [np.nan]], C), 0.5), "B", "no finite number"),
         ((3.0, 0.5), "systems[0]", "type float"),
+        ((("a", B, C), 0.5), "A", "no array of numbers"),
+        (((A, np.array(B) + 1j, C), 0.5), "B", "complex entries: give real numbers"),
+        (((A, B, C, D, "fast"), 0.5), "dt", "no array of numbers"),
+        (((A, B, C, D, -1.0), 0.5), "dt", "or 0 for a continuous model"),
+        (((np.ones((2, 2, 2)), B, C), 0.5), "A", "3 dimensions"),
+        (((A, B, C), "fast"), "sample_time", "positive number of seconds"),
+        ((([[300.0]], [[1.0]], [[1.0]], 0, 0), 10.0), "sample_time", "systems[0]: the model grows"),
     ],
 )
 def test_what_does_not_fit_is_said(arguments: tuple, key: str, says: str) -> None:
@@ -88,10 +95,20 @@ def test_what_does_not_fit_is_said(arguments: tuple, key: str, says: str) -> Non
     assert refused.value.key == key
 
 
+@pytest.mark.parametrize("key", ["inputs", "outputs", "states"])
+def test_a_signal_is_a_name_or_a_dictionary(key: str) -> None:
+    """And nothing else: the entry is named."""
+    with pytest.raises(ftc.DesignFileError, match="give a name, or a dictionary") as refused:
+        ftc.Plant((A, B, C, D, 0), 0.5, **{key: ["sound", 2]})
+    assert refused.value.key == f"signals.{key}[2]"
+
+
 def test_disturbances_that_are_not_there_are_refused() -> None:
     """By number and by name."""
     with pytest.raises(ftc.DesignFileError, match="column 2, B has columns 0 to 1"):
         ftc.Plant((A, B, C, D, 0), 0.5, disturbance_inputs=[2])
+    with pytest.raises(ftc.DesignFileError, match="names a column twice"):
+        ftc.Plant((A, B, C, D, 0), 0.5, disturbance_inputs=[1, 1])
     with pytest.raises(ftc.DesignFileError, match='no input "wind"'):
         ftc.Plant((A, B, C, D, 0), 0.5, disturbance_inputs=["wind"])
 

@@ -13,7 +13,7 @@ mod table;
 mod time;
 
 pub use error::{EntryError, Error, MatrixError, TimeColumnError, TimeError};
-pub use regular::open_regular;
+pub use regular::{open_regular, read_regular};
 pub use resample::{Interpolation, resample};
 pub use table::{MOST_ROWS, Place, Row, Table};
 pub use time::{Clock, TimeColumn, find_time_column};

@@ -7,10 +7,9 @@ mod hdf5;
 mod level5;
 
 use crate::silent::caught;
-use crate::{EntryError, Error, MatrixError, open_regular, quote};
+use crate::{EntryError, Error, MatrixError, quote, read_regular};
 use nalgebra::DMatrix;
 use std::collections::BTreeMap;
-use std::io::Read;
 use std::path::Path;
 
 /// The most bytes of a file that are read: matrices of control models are small.
@@ -35,17 +34,7 @@ impl Matrices {
     /// # Errors
     /// A file that cannot be read, has no format that is known, or holds no matrix.
     pub fn read(path: &Path) -> Result<Self, Error> {
-        let mut bytes = Vec::new();
-        open_regular(path, MOST_BYTES)?
-            .read_to_end(&mut bytes)
-            .map_err(|error| Error::unreadable(&error))?;
-        if bytes.len() as u64 > MOST_BYTES {
-            return Err(Error::TooLarge {
-                megabytes: MOST_BYTES >> 20,
-                growing: true,
-                advice: "keep to the matrices of the model",
-            });
-        }
+        let bytes = read_regular(path, MOST_BYTES)?;
         // The readers of damaged files are not proof against every length that a file may claim.
         let found = caught(|| parse(bytes)).unwrap_or_else(|| Err(MatrixError::Damaged.into()))?;
         if found.is_empty() {

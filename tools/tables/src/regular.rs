@@ -35,3 +35,22 @@ pub fn open_regular(path: &Path, most: u64) -> Result<Take<File>, Error> {
     }
     Ok(file.take(most + 1))
 }
+
+/// The bytes of a regular file of at most `most`.
+///
+/// # Errors
+/// As [`open_regular`], and where reading fails half way or the file grows meanwhile.
+pub fn read_regular(path: &Path, most: u64) -> Result<Vec<u8>, Error> {
+    let mut bytes = Vec::new();
+    open_regular(path, most)?
+        .read_to_end(&mut bytes)
+        .map_err(|error| Error::unreadable(&error))?;
+    match bytes.len() as u64 > most {
+        false => Ok(bytes),
+        true => Err(Error::TooLarge {
+            megabytes: most >> 20,
+            growing: true,
+            advice: "shorten it, or name another file",
+        }),
+    }
+}

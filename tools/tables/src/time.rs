@@ -54,6 +54,13 @@ pub struct TimeColumn {
     unit: f64,
 }
 
+impl TimeColumn {
+    /// Seconds per unit of its numbers.
+    pub fn seconds(&self) -> f64 {
+        self.unit
+    }
+}
+
 /// A name without the unit behind it, in lower case, and the unit.
 fn split_unit(name: &str) -> (String, Option<String>) {
     let lower = name.trim().to_lowercase();
