@@ -7,15 +7,16 @@ mod plants;
 use ftc_design::augmented::augment;
 use ftc_design::state_feedback::{synthesise, synthesise_with};
 use ftc_design::{
-    ControlSpec, DesignError, Lyapunov, Objective, Run, Solver, StateFeedback, Units,
+    ControlSpec, DesignError, Lyapunov, Objective, Run, Solver, StateFeedback, Step, Units,
 };
 use ftc_plant::scaling::Scaling;
-use ftc_plant::{SwitchedPlant, spectral_radius};
+use ftc_plant::{Mode, OperatingPoint, SwitchedPlant, spectral_radius};
 use nalgebra::{Complex, DMatrix};
 use plants::{
     Channel, half_unstable, in_units, paper, paper_spec, random_plant, rectifier,
     sparsely_disturbed, spread_units, three_modes, two_channels, usual_spec,
 };
+use std::sync::atomic::{AtomicUsize, Ordering};
 
 /// Half a unit of the fourth decimal, to which the reference values are given, plus the relaxation that
 /// is given up for a margin.
@@ -454,6 +455,51 @@ fn no_random_plant_is_left_without_its_optimum() {
         }
     }
     assert!(designed >= 14, "{designed} designs");
+}
+
+/// One mode of ten states and more, where the dual solution says little: the optimum is known all the same, and
+/// no other solver is asked, which would take minutes.
+#[test]
+fn the_optimum_of_a_single_large_mode_is_known_at_once() {
+    for seed in 0..3 {
+        let random = |k: usize, r: usize, c: usize| {
+            let angle = |row: usize, column: usize| {
+                1.0 + (17 * seed + 5 * k) as f64
+                    + 3.7 * (row * row) as f64
+                    + 2.9 * (row * column) as f64
+                    + 1.3 * column as f64
+            };
+            DMatrix::from_fn(r, c, |row, column| angle(row, column).sin())
+        };
+        let n = 10 + seed;
+        let raw = random(1, n, n);
+        let mode = Mode {
+            name: String::new(),
+            a: &raw * (0.9 / raw.clone().singular_values().max()),
+            b: random(2, n, n / 2),
+            c: random(3, n / 2, n),
+            e: random(4, n, 1),
+            f: DMatrix::zeros(n / 2, 1),
+            operating_point: OperatingPoint::zero(n, n / 2, n / 2),
+        };
+        let plant = SwitchedPlant {
+            sample_time: 1.0,
+            modes: vec![mode],
+        };
+        let spec = usual(&plant, Lyapunov::Common, 0.97);
+        let asked = AtomicUsize::new(0);
+        let watch = |step: Step| {
+            asked.fetch_add(usize::from(step == Step::GeneralSolver), Ordering::Relaxed);
+        };
+        let run = Run {
+            watch: &watch,
+            ..Run::default()
+        };
+        let scaling = Scaling::automatic(&plant);
+        let design = synthesise_with(&plant, &spec, &scaling, &run).unwrap();
+        assert_eq!(design.is_optimal(0), Some(true), "{n} states");
+        assert_eq!(asked.load(Ordering::Relaxed), 0, "{n} states");
+    }
 }
 
 #[test]

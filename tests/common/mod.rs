@@ -191,6 +191,7 @@ pub fn controller_design(channel: Channel, noise: f64) -> ControllerDesign {
             }),
             harmonic_transfers: ftc_design::harmonics::transfers(
                 &plant,
+                &[1.0, 1.0],
                 core::f64::consts::TAU / 0.02,
                 1,
             ),

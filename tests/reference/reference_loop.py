@@ -145,6 +145,8 @@ class Estimator:
         self.enabled = self.settings["method"] == "reference"
         self.length = self.settings["response_length"]
         self.outputs = len(self.modes[0].y0)
+        nominal = [output["nominal"] for output in design["signals"]["outputs"]]
+        self.units = 2.0 ** np.round(np.log2(nominal))[:, None]
         self.responses = [np.array(p["response"]) for p in self.settings["predictors"]]
         factors = [np.array(p["factor"]) for p in self.settings["predictors"]]
         self.dispersions = [np.linalg.inv(R.T @ R) for R in factors]
@@ -174,7 +176,8 @@ class Estimator:
         angles = [2 * math.pi * (h + 1) / harmonics["period"] for h in range(harmonics["count"])]
         responses = [[disturbance_response(self.modes[i], angle) for i in (left, mode)] for angle in angles]
         if any(response.any() for pair in responses for response in pair):
-            ratios = [entered @ np.linalg.pinv(was) for was, entered in responses]
+            scaled = [[response / self.units for response in pair] for pair in responses]
+            ratios = [self.units * (entered @ np.linalg.pinv(was)) / self.units.T for was, entered in scaled]
             self.fits[mode].carry_over(self.fits[left], ratios, np.array(self.settings["thresholds"]) / 6.0)
 
     def judge(self, tick: int, mode: int, y: np.ndarray) -> None:

@@ -6,9 +6,10 @@ pub use super::harmonics::KnownDisturbance;
 use super::hypotheses::{self, HypothesesSpec};
 use super::matrices::{dense, plain};
 use super::{
-    ControlSpec, ControllerDesign, Design, DesignError, FORMAT, Failure, ObserverSpec,
-    RequestError, Run, Signal, Signals, check_controllable, synthesise_with,
+    CertificateError, ControlSpec, ControllerDesign, Design, DesignError, FORMAT, Failure,
+    ObserverSpec, RequestError, Run, Signal, Signals, check_controllable, synthesise_with,
 };
+use crate::coverage;
 use crate::running_loop::{TRANSFER_DECAY, TransferCertificate};
 use crate::work::Work;
 use ftc_control::parameters::{
@@ -186,6 +187,7 @@ pub fn assemble_with(request: Request, run: &Run) -> Result<Design, Failure> {
     let work = Work::new(dims, request.plant.modes.len(), &request.control);
     work.check(&request.control)
         .map_err(|large| DesignError::Request(large.into()))?;
+    check_operating_inputs(&request.plant, &request.signals.inputs).map_err(DesignError::from)?;
     let estimator = estimator(&request, dims).map_err(DesignError::from)?;
     let scaling = request.signals.scaling();
     check_controllable(&request.plant, &request.control, &scaling)
@@ -210,7 +212,7 @@ pub fn assemble_with(request: Request, run: &Run) -> Result<Design, Failure> {
         request.feedforward,
         &input_limits,
     );
-    Ok(Design {
+    let design = Design {
         format: FORMAT,
         name: request.name,
         signals: request.signals,
@@ -224,7 +226,32 @@ pub fn assemble_with(request: Request, run: &Run) -> Result<Design, Failure> {
         true_plant: request.true_plant,
         scenario: request.scenario,
         proof: Some(synthesis.into()),
-    })
+    };
+    // What would be refused of the FMU is not shipped.
+    let follows = coverage::check(&design);
+    follows.map_err(|error| DesignError::from(CertificateError::malformed(error)))?;
+    Ok(design)
+}
+
+/// Refuses an operating point whose input lies beyond its limits: no controller could hold it.
+fn check_operating_inputs(plant: &SwitchedPlant, inputs: &[Signal]) -> Result<(), RequestError> {
+    for (mode, described) in plant.modes.iter().enumerate() {
+        for (input, (&value, signal)) in described.operating_point.u.iter().zip(inputs).enumerate()
+        {
+            let (min, max) = (signal.min, signal.max);
+            if (Limits { min, max }).clamp(value) != value {
+                let (mode, input) = (mode + 1, input + 1);
+                return Err(RequestError::OperatingInput {
+                    mode,
+                    input,
+                    value,
+                    min,
+                    max,
+                });
+            }
+        }
+    }
+    Ok(())
 }
 
 /// The sensors' noise as the observer is designed for it: that of the scenario, and of a sensor without
@@ -296,7 +323,8 @@ fn estimator(request: &Request, dims: Dimensions) -> Result<Estimator, RequestEr
         .filter(|_| !state_based)
         .map(|known| known_harmonics(known, &request.plant, &thresholds));
     let harmonic_transfers = harmonics.as_ref().map_or_else(Vec::new, |known| {
-        harmonics::transfers(&request.plant, known.period, known.count)
+        let nominal = request.signals.scaling().outputs;
+        harmonics::transfers(&request.plant, &nominal, known.period, known.count)
     });
     let hypotheses = state_based.then(|| {
         let known = spec.disturbance.as_ref();

@@ -4,6 +4,7 @@
 //! held against a relation that it must satisfy. [`UNCOVERED`] names what is left.
 
 use crate::assembly::{self, KnownDisturbance};
+use crate::augmented::scaled;
 use crate::harmonics;
 use crate::hypotheses;
 use crate::matrices::dense;
@@ -12,18 +13,16 @@ use crate::{
     CertificateError, Design, HypothesesSpec, ObserverDesign, RecordError, StateFeedback, Synthesis,
 };
 use ftc_control::Matrix;
-use ftc_control::parameters::{Estimator, EstimatorMethod, FeedbackGains, ObserverKind};
+use ftc_control::parameters::{Estimator, EstimatorMethod, FeedbackGains, ObserverKind, Predictor};
+use ftc_plant::scaling::Scaling;
 use nalgebra::DMatrix;
 
 /// How far a number may lie from what it is derived to be, relative to the largest of its kind:
 /// rounding on another machine, and no more.
 const TOLERANCE: f64 = 1e-9;
 
-/// The farthest an operating point may lie from zero, in nominal values of its signal.
-const FARTHEST: f64 = 1e6;
-
-/// The largest threshold, in nominal values of its output.
-const LARGEST_THRESHOLD: f64 = 1e3;
+/// The largest magnitude of an operating point or a threshold: that of a number in a design file.
+const LARGEST: f64 = 1e15;
 
 /// Numbers of a design that `verify` holds against bounds only, in words for its report.
 pub const UNCOVERED: [&str; 7] = [
@@ -107,14 +106,15 @@ fn all(conditions: &[(bool, &str)]) -> Result<(), CoverageError> {
     }
 }
 
-/// Whether two matrices agree up to rounding.
-fn close(found: &Matrix, derived: &Matrix) -> bool {
-    let (found, derived) = (dense(found), dense(derived));
-    found.shape() == derived.shape()
-        && found
-            .iter()
-            .zip(derived.iter())
-            .all(|(f, d)| (f - d).abs() <= TOLERANCE * derived.amax())
+/// Whether two matrices agree up to rounding, where rows and columns are in these units: what is small
+/// because of its unit alone counts as much as the rest.
+fn close(found: &Matrix, derived: &Matrix, rows: &[f64], columns: &[f64], tolerance: f64) -> bool {
+    if found.shape() != derived.shape() || found.shape() != (rows.len(), columns.len()) {
+        return false;
+    }
+    let [found, derived] = [found, derived].map(|matrix| scaled(&dense(matrix), rows, columns));
+    let mut pairs = found.iter().zip(derived.iter());
+    pairs.all(|(f, d)| (f - d).abs() <= tolerance * derived.amax())
 }
 
 fn check_feedback(design: &Design, synthesis: &Synthesis) -> Result<(), CoverageError> {
@@ -127,33 +127,70 @@ fn check_feedback(design: &Design, synthesis: &Synthesis) -> Result<(), Coverage
         &design.signals.input_limits(),
     );
     all(&[(running.transfer == derived.transfer, "bumpless transfer")])?;
+    let units = GainUnits::new(proved);
     for (mode, (runs, gains)) in running.modes.iter().zip(&derived.modes).enumerate() {
-        check_gains(mode, runs, gains)?;
+        check_gains(mode, runs, gains, &units)?;
     }
     Ok(())
+}
+
+/// The units of what the gains outside the proved loop connect, as the certificate has them.
+struct GainUnits {
+    inputs: Vec<f64>,
+    outputs: Vec<f64>,
+    tracked: Vec<f64>,
+    integrals: Vec<f64>,
+}
+
+impl GainUnits {
+    fn new(proved: &StateFeedback) -> Self {
+        let (units, spec) = (&proved.certificate.units, &proved.spec);
+        Self {
+            inputs: units.inputs.clone(),
+            outputs: units.outputs.clone(),
+            tracked: spec.tracked.iter().map(|&k| units.outputs[k]).collect(),
+            integrals: units.integral_part(spec),
+        }
+    }
 }
 
 fn check_gains(
     mode: usize,
     runs: &FeedbackGains,
     derived: &FeedbackGains,
+    units: &GainUnits,
 ) -> Result<(), CoverageError> {
+    let GainUnits {
+        inputs,
+        outputs,
+        tracked,
+        integrals,
+    } = units;
+    let same = |found: &Matrix, derived: &Matrix, rows: &[f64], columns: &[f64]| {
+        let none = derived.shape().1 == 0 && found.shape() == derived.shape();
+        none || close(found, derived, rows, columns, TOLERANCE)
+    };
     let rounded = [
-        (&runs.feedforward, &derived.feedforward, "the feedforward"),
         (
-            &runs.anti_windup,
-            &derived.anti_windup,
+            same(&runs.feedforward, &derived.feedforward, inputs, tracked),
+            "the feedforward",
+        ),
+        (
+            same(&runs.anti_windup, &derived.anti_windup, integrals, inputs),
             "the anti-windup gain",
         ),
         (
-            &runs.output_feedback,
-            &derived.output_feedback,
+            same(
+                &runs.output_feedback,
+                &derived.output_feedback,
+                inputs,
+                outputs,
+            ),
             "the gain of the additive control",
         ),
     ];
-    let mut pairs = rounded.iter();
-    match pairs.find(|(runs, derived, _)| !close(runs, derived)) {
-        Some((.., what)) => Err(differs(&format!("mode {}: {what}", mode + 1))),
+    match rounded.iter().find(|(same, _)| !same) {
+        Some((_, what)) => Err(differs(&format!("mode {}: {what}", mode + 1))),
         None => Ok(()),
     }
 }
@@ -175,20 +212,15 @@ fn check_observer(design: &Design, synthesis: &Synthesis) -> Result<(), Coverage
 }
 
 fn check_operating_points(design: &Design) -> Result<(), CoverageError> {
-    let signals = &design.signals;
     for (mode, described) in design.plant.modes.iter().enumerate() {
         let point = &described.operating_point;
         let parts = [
-            (&point.x, &signals.states, "state"),
-            (&point.u, &signals.inputs, "input"),
-            (&point.y, &signals.outputs, "output"),
+            (&point.x, "state"),
+            (&point.u, "input"),
+            (&point.y, "output"),
         ];
-        for (values, signals, what) in parts {
-            let near = values
-                .iter()
-                .zip(signals)
-                .all(|(value, signal)| value.abs() <= FARTHEST * signal.nominal);
-            if !near {
+        for (values, what) in parts {
+            if !values.iter().all(|value| value.abs() <= LARGEST) {
                 return Err(differs(&format!(
                     "the operating {what} of mode {}",
                     mode + 1
@@ -225,21 +257,25 @@ fn check_limits(design: &Design) -> Result<(), CoverageError> {
 
 fn check_estimator(design: &Design) -> Result<(), CoverageError> {
     let estimator = &design.controller.estimator;
-    let outputs = &design.signals.outputs;
-    let threshold =
-        |(&value, nominal): (&f64, f64)| value > 0.0 && value <= LARGEST_THRESHOLD * nominal;
-    let thresholds = estimator
-        .thresholds
-        .iter()
-        .zip(outputs.iter().map(|o| o.nominal));
+    let units = design.signals.scaling();
+    let threshold = |&value: &f64| value > 0.0 && value <= LARGEST;
     all(&[
-        (thresholds.clone().all(threshold), "a threshold"),
+        (estimator.thresholds.iter().all(threshold), "a threshold"),
         (
             estimator.leverage_limit == assembly::LEVERAGE_LIMIT,
             "the limit of the leverage",
         ),
-        (estimator.predictors.iter().all(plausible), "a predictor"),
-        (transfers_fit(design, estimator), "a transfer of harmonics"),
+        (
+            estimator
+                .predictors
+                .iter()
+                .all(|predictor| plausible(predictor, &units)),
+            "a predictor",
+        ),
+        (
+            transfers_fit(design, estimator, &units.outputs),
+            "a transfer of harmonics",
+        ),
         (hypotheses_fit(design), "a size or rate of the estimator"),
     ])
 }
@@ -284,29 +320,32 @@ fn hypotheses_fit(design: &Design) -> bool {
     same_turns && chosen && derived == *found
 }
 
-/// Finite, a regular triangular factor, deviations that are none or positive.
-fn plausible(predictor: &ftc_control::parameters::Predictor) -> bool {
-    let factor = dense(&predictor.factor);
+/// Of a size that its signals can have, a regular triangular factor, deviations that are none or positive.
+fn plausible(predictor: &Predictor, units: &Scaling) -> bool {
+    let inputs = units.inputs.iter().copied().cycle();
+    let past: Vec<f64> = inputs.take(predictor.factor.shape().1).collect();
+    let rows = vec![1.0; past.len()];
+    let inverse: Vec<f64> = past.iter().map(|unit| 1.0 / unit).collect();
+    let factor = scaled(&dense(&predictor.factor), &rows, &inverse);
+    let response = scaled(&dense(&predictor.response), &units.outputs, &past);
+    let deviations = predictor.deviation.iter().zip(&units.outputs);
     let regular = (0..factor.nrows()).all(|k| factor[(k, k)] != 0.0);
     let triangular =
         (0..factor.ncols()).all(|c| (c + 1..factor.nrows()).all(|r| factor[(r, c)] == 0.0));
     let finite = |value: &f64| value.is_finite() && value.abs() < 1e12;
     regular
         && triangular
-        && predictor
-            .response
-            .as_slice()
-            .iter()
-            .chain(factor.iter())
-            .all(finite)
-        && predictor.deviation.iter().all(|d| (0.0..1e12).contains(d))
+        && response.iter().chain(factor.iter()).all(finite)
+        && deviations
+            .into_iter()
+            .all(|(d, unit)| (0.0..1e12).contains(&(d / unit)))
 }
 
 /// What a response learned in one mode tells of another follows from the plant.
-fn transfers_fit(design: &Design, estimator: &Estimator) -> bool {
+fn transfers_fit(design: &Design, estimator: &Estimator, outputs: &[f64]) -> bool {
     let derived = match &estimator.harmonics {
         Some(known) if known.period > 0.0 && known.count > 0 && known.count < 100 => {
-            harmonics::transfers(&design.plant, known.period, known.count)
+            harmonics::transfers(&design.plant, outputs, known.period, known.count)
         }
         Some(_) => return false,
         None => Vec::new(),
@@ -322,7 +361,8 @@ fn transfers_fit(design: &Design, estimator: &Estimator) -> bool {
     let (found, derived) = (maps(&estimator.harmonic_transfers), maps(&derived));
     found.len() == derived.len()
         && found.iter().zip(&derived).all(|(f, d)| {
-            let [found, derived] = [f, d].map(|map| [dense(&map.real), dense(&map.imaginary)]);
+            let part = |matrix| scaled(&dense(matrix), outputs, outputs);
+            let [found, derived] = [f, d].map(|map| [part(&map.real), part(&map.imaginary)]);
             let largest = derived[0].amax().max(derived[1].amax());
             let near = |a: &DMatrix<f64>, b: &DMatrix<f64>| {
                 a.shape() == b.shape() && (a - b).amax() <= 1e-7 * largest

@@ -6,6 +6,7 @@
 //! initial value than zero where the model is approximate.
 
 use super::matrices::plain;
+use super::units::power_of_two;
 use core::f64::consts::TAU;
 use ftc_control::parameters::PhasorMap;
 use ftc_plant::{Mode, SwitchedPlant};
@@ -44,10 +45,17 @@ impl KnownDisturbance {
 /// Singular values below this fraction of the largest count as zero.
 const TOLERANCE: f64 = 1e-9;
 
-/// Maps of all harmonics, `[from][to][harmonic]`, for a period in samples.
+/// Maps of all harmonics, `[from][to][harmonic]`, for a period in samples. `outputs` holds the outputs'
+/// nominal values (p): they weigh the outputs where there are more of them than disturbances.
 ///
 /// Empty where the plant has no disturbance, since then nothing can be said.
-pub fn transfers(plant: &SwitchedPlant, period: f64, count: usize) -> Vec<Vec<Vec<PhasorMap>>> {
+pub fn transfers(
+    plant: &SwitchedPlant,
+    outputs: &[f64],
+    period: f64,
+    count: usize,
+) -> Vec<Vec<Vec<PhasorMap>>> {
+    let units: Vec<f64> = outputs.iter().map(|&value| power_of_two(value)).collect();
     let responses: Option<Vec<Vec<_>>> = plant
         .modes
         .iter()
@@ -62,27 +70,51 @@ pub fn transfers(plant: &SwitchedPlant, period: f64, count: usize) -> Vec<Vec<Ve
     let Some(responses) = responses.filter(|modes| !silent(modes)) else {
         return Vec::new();
     };
-    let map = |from: &DMatrix<Complex<f64>>, to: &DMatrix<Complex<f64>>| {
-        let threshold = TOLERANCE * from.norm().max(f64::MIN_POSITIVE);
-        let inverse = from
-            .clone()
-            .pseudo_inverse(threshold)
-            .unwrap_or_else(|_| from.adjoint());
-        let product = to * inverse;
-        PhasorMap {
-            real: plain(&product.map(|z| z.re)),
-            imaginary: plain(&product.map(|z| z.im)),
-        }
-    };
     responses
         .iter()
         .map(|from| {
-            responses
-                .iter()
-                .map(|to| from.iter().zip(to).map(|(f, t)| map(f, t)).collect())
-                .collect()
+            let harmonics = |to| {
+                from.iter()
+                    .zip(to)
+                    .map(|(f, t)| map(f, t, &units))
+                    .collect()
+            };
+            responses.iter().map(harmonics).collect()
         })
         .collect()
+}
+
+/// `G_j G_i^+`, taken where outputs are in `units` and the disturbances' own are such that each moves
+/// the outputs by about one.
+fn map(from: &DMatrix<Complex<f64>>, to: &DMatrix<Complex<f64>>, units: &[f64]) -> PhasorMap {
+    let (mut from, mut to) = (from.clone(), to.clone());
+    for response in [&mut from, &mut to] {
+        for (mut row, unit) in response.row_iter_mut().zip(units) {
+            row /= Complex::from(*unit);
+        }
+    }
+    for (mut left, mut entered) in from.column_iter_mut().zip(to.column_iter_mut()) {
+        let unit = Complex::from(power_of_two(left.norm()));
+        left /= unit;
+        entered /= unit;
+    }
+    let threshold = TOLERANCE * from.norm().max(f64::MIN_POSITIVE);
+    let inverse = from
+        .clone()
+        .pseudo_inverse(threshold)
+        .unwrap_or_else(|_| from.adjoint());
+    let product = to * inverse;
+    let part = |of: fn(&Complex<f64>) -> f64| {
+        plain(&DMatrix::from_fn(
+            product.nrows(),
+            product.ncols(),
+            |row, column| of(&product[(row, column)]) * (units[row] / units[column]),
+        ))
+    };
+    PhasorMap {
+        real: part(|z| z.re),
+        imaginary: part(|z| z.im),
+    }
 }
 
 /// A bound of each output (p) under a disturbance of the given amplitudes (s) at any of the first
@@ -158,7 +190,7 @@ mod tests {
             (sine, cosine)
         };
         let (a, b) = phasor(&plant.modes[0]);
-        let map = &transfers(&plant, period, 1)[0][1][0];
+        let map = &transfers(&plant, &[1.0], period, 1)[0][1][0];
         let (re, im) = (map.real.as_slice()[0], map.imaginary.as_slice()[0]);
         let expected = phasor(&plant.modes[1]);
         assert!(
@@ -173,7 +205,7 @@ mod tests {
             sample_time: 1.0,
             modes: vec![first_order(0.8, 0.0)],
         };
-        assert!(transfers(&plant, 20.0, 1).is_empty());
+        assert!(transfers(&plant, &[1.0], 20.0, 1).is_empty());
     }
 
     fn lag() -> SwitchedPlant {

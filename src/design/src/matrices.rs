@@ -1,6 +1,7 @@
 //! Between the matrices that are computed with off line and those that run on line: entry by entry,
 //! nothing is rounded.
 
+use crate::augmented::scaled;
 use ftc_control::Matrix;
 use ftc_control::parameters::ModeModel;
 use ftc_plant::SwitchedPlant;
@@ -31,6 +32,23 @@ pub fn mode_models(plant: &SwitchedPlant) -> Vec<ModeModel> {
         y0: mode.operating_point.y.clone(),
     });
     modes.collect()
+}
+
+/// [`pseudo_inverse`] of a matrix whose rows and columns have units (powers of two): taken where every
+/// signal is divided by its own, so that no unit decides what is negligible, or what is small.
+pub(crate) fn pseudo_inverse_in(
+    matrix: &DMatrix<f64>,
+    rows: &[f64],
+    columns: &[f64],
+    tolerance: f64,
+) -> DMatrix<f64> {
+    let mut inverse = pseudo_inverse(&scaled(matrix, rows, columns), tolerance);
+    for (mut column, unit) in inverse.column_iter_mut().zip(rows) {
+        for (value, own) in column.iter_mut().zip(columns) {
+            *value *= own / unit;
+        }
+    }
+    inverse
 }
 
 /// The Moore-Penrose inverse; singular values below `tolerance` times the largest count as zero.

@@ -76,6 +76,24 @@ pub enum RequestError {
         /// The weakest direction over the strongest.
         ratio: f64,
     },
+    /// No controller can hold an operating point beyond the limits.
+    #[error(
+        "mode {mode}: its operating point has {value} at input {input}, which is limited to {}: give \
+         operating_point.u within signals.inputs, or other limits",
+        interval(*min, *max)
+    )]
+    OperatingInput {
+        /// The mode.
+        mode: usize,
+        /// The input.
+        input: usize,
+        /// Its value at the operating point.
+        value: f64,
+        /// Its lower limit.
+        min: Option<f64>,
+        /// Its upper limit.
+        max: Option<f64>,
+    },
     /// Bumpless transfer cannot be proved.
     #[error(
         "controller.bumpless = true cannot be proved for this design: set it to false, ask for another decay, or for \
@@ -130,6 +148,15 @@ pub enum RequestError {
     /// The design holds gains that were not made by synthesis.
     #[error("the gains were not made by synthesis: design them again")]
     NotSynthesised,
+}
+
+fn interval(min: Option<f64>, max: Option<f64>) -> String {
+    match (min, max) {
+        (Some(min), Some(max)) => format!("{min} to {max}"),
+        (Some(min), None) => format!("{min} or more"),
+        (None, Some(max)) => format!("{max} or less"),
+        (None, None) => "any value".into(),
+    }
 }
 
 fn entering(mode: usize, successor: usize) -> String {

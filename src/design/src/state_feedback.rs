@@ -24,7 +24,7 @@ pub use synthesis::{synthesise, synthesise_with};
 pub(crate) use proof::scaled_gain;
 
 use super::certificate::{CertificateError, ControlCertificate};
-use super::matrices::{plain, pseudo_inverse};
+use super::matrices::{plain, pseudo_inverse_in};
 use super::{ControlSpec, DwellTime};
 use ftc_control::Matrix;
 use ftc_control::parameters::{self, FeedbackGains};
@@ -101,14 +101,24 @@ impl StateFeedback {
     /// an FMU only multiplies and adds and gives the same bits on every machine. The anti-windup
     /// gain is `G^+`: the integral is pulled back to where the clamped command would have come from.
     pub fn for_controller(&self, plant: &SwitchedPlant) -> parameters::StateFeedback {
+        let units = &self.certificate.units;
+        let integrals = units.integral_part(&self.spec);
         let modes = self.modes.iter().zip(&plant.modes);
         let modes = modes.map(|(gains, mode)| FeedbackGains {
             state_feedback: plain(&gains.state_feedback),
             integral: plain(&gains.integral),
             feedforward: Matrix::zeros(gains.integral.nrows(), 0),
             previous_input: plain(&gains.previous_input),
-            anti_windup: plain(&pseudo_inverse(&gains.integral, 1e-12)),
-            output_feedback: plain(&(&gains.state_feedback * pseudo_inverse(&mode.c, 1e-12))),
+            anti_windup: plain(&pseudo_inverse_in(
+                &gains.integral,
+                &units.inputs,
+                &integrals,
+                1e-12,
+            )),
+            output_feedback: plain(
+                &(&gains.state_feedback
+                    * pseudo_inverse_in(&mode.c, &units.outputs, &units.states, 1e-12)),
+            ),
         });
         parameters::StateFeedback {
             tracked: self.spec.tracked.clone(),

@@ -142,9 +142,11 @@ impl Waveform {
     /// Silence.
     pub const ZERO: Self = Self::Constant { value: 0.0 };
 
-    /// Its least and its largest value in the first `steps` ticks; infinite the wrong way round if there are none.
+    /// Its least and its largest value in the first `steps` ticks, of which a million are looked at; infinite
+    /// the wrong way round if there are none.
     pub fn range(&self, steps: u64, sample_time: f64) -> [f64; 2] {
-        let values = (0..steps).map(|tick| self.at(tick, sample_time));
+        const LOOKED_AT: u64 = 1_000_000;
+        let values = (0..steps.min(LOOKED_AT)).map(|tick| self.at(tick, sample_time));
         values.fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], value| {
             [low.min(value), high.max(value)]
         })
@@ -275,6 +277,19 @@ mod tests {
         };
         let values: Vec<f64> = (0..7).map(|k| signal.at(k, 0.1)).collect();
         assert_eq!(values, [0.0, 0.0, 0.0, 1.0, 1.0, -1.0, -1.0]);
+    }
+
+    /// A forged length of a scenario keeps nobody waiting.
+    #[test]
+    fn the_range_of_a_scenario_without_end_is_found() {
+        let signal = Waveform::Sine {
+            amplitude: 2.0,
+            period: 40.0,
+            phase: 0.0,
+            offset: 1.0,
+        };
+        assert_eq!(signal.range(u64::MAX, 1.0), [-1.0, 3.0]);
+        assert_eq!(signal.range(0, 1.0), [f64::INFINITY, f64::NEG_INFINITY]);
     }
 
     #[test]

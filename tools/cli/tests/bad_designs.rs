@@ -291,6 +291,18 @@ fn the_plant() {
             &["mode 1: operating_point.u has 1 entries"],
         ),
         (
+            "an operating point beyond the limits of an input",
+            "[signals]",
+            "[signals]\ninputs = [{ min = 1.0 }, {}]",
+            &[
+                "mode 1",
+                "0 at input 1",
+                "1 or more",
+                "operating_point.u",
+                "signals.inputs",
+            ],
+        ),
+        (
             "half an operating point",
             "u = [0, 0], y = [0, 0]",
             "y = [0, 0]",

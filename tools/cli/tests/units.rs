@@ -48,6 +48,23 @@ fn given_nominal_values_win() {
     assert!((one[0] / other[0] - 1.0).abs() < 1e-3, "{one:?} {other:?}");
 }
 
+/// Readings far from zero, thresholds beyond any fault, no nominal values: what is designed is proved.
+#[test]
+fn what_is_designed_is_proved_again_whatever_the_units() {
+    let far = "name = \"far\"\nsample_time = 1.0\n[[mode]]\nA = [[0.9, 0.2], [0.1, 0.5]]\nB = [[1.0], [1.0]]\n\
+        C = [[0.0, 1.0]]\nE = [[1.0], [0.0]]\noperating_point = { x = [2e9, 1e8], u = [1.0], y = [2e9] }\n\
+        [controller]\ndecay = 0.97\n[estimator]\nthreshold = 1e9\n[scenario]\nnoise = 1.0\nreference = [2e9]\n";
+    let bench = Bench::new(far);
+    for arguments in [
+        &["design", FILE, "--save", "solved.json"][..],
+        // Refused unless the very proof of `verify` goes through.
+        &["simulate", FILE, "--solved", "solved.json", "--out", "out"],
+    ] {
+        let run = bench.run(arguments);
+        assert_eq!(run.code(), 0, "{}", run.stderr());
+    }
+}
+
 /// Six states whose units lie eight decades apart.
 const CHAIN: &str = r#"name = "scaled_1e8"
 sample_time = 0.004

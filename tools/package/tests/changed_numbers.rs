@@ -85,13 +85,18 @@ fn is_certified_gain(path: &str) -> bool {
 
 /// Whether gains outside the proved loop differ by less than their own rounding, and nothing else does.
 fn rounding(design: &Design, original: &Design) -> bool {
-    let near = |found: &Matrix, derived: &Matrix| {
+    let units = original.signals.scaling();
+    let feedback = &original.controller.feedback;
+    let tracked: Vec<f64> = feedback.tracked.iter().map(|&k| units.outputs[k]).collect();
+    let pairs = tracked.iter().flat_map(|&unit| [unit; 2]);
+    let turning = feedback.resonators.iter().flat_map(|_| pairs.clone());
+    let integrals: Vec<f64> = tracked.iter().copied().chain(turning).collect();
+    // In units of the signals, or an entry in a large unit would hide one in a small unit.
+    let near = |found: &Matrix, derived: &Matrix, rows: &[f64], columns: &[f64]| {
         let entries = |matrix: &Matrix| -> Vec<f64> {
-            let rows = 0..matrix.nrows();
-            rows.flat_map(|row| {
-                (0..matrix.ncols()).filter_map(move |column| matrix.get(row, column))
-            })
-            .collect()
+            let at = (0..matrix.nrows()).flat_map(|r| (0..matrix.ncols()).map(move |c| (r, c)));
+            at.map(|(r, c)| matrix.get(r, c).unwrap() * columns[c] / rows[r])
+                .collect()
         };
         let (shapes, found) = (found.shape() == derived.shape(), entries(found));
         let derived = entries(derived);
@@ -99,17 +104,28 @@ fn rounding(design: &Design, original: &Design) -> bool {
             .iter()
             .fold(0.0_f64, |most, value| most.max(value.abs()));
         let mut pairs = found.iter().zip(&derived);
-        shapes && pairs.all(|(f, d)| (f - d).abs() <= 1e-9 * largest)
+        shapes && pairs.all(|(f, d)| (f - d).abs() <= 5e-9 * largest)
     };
     let mut same = design.clone();
     let modes = same.controller.feedback.modes.iter_mut();
     for (gains, known) in modes.zip(&original.controller.feedback.modes) {
-        for (found, derived) in [
-            (&mut gains.feedforward, &known.feedforward),
-            (&mut gains.anti_windup, &known.anti_windup),
-            (&mut gains.output_feedback, &known.output_feedback),
+        let (inputs, outputs) = (&units.inputs, &units.outputs);
+        for (found, derived, rows, columns) in [
+            (&mut gains.feedforward, &known.feedforward, inputs, &tracked),
+            (
+                &mut gains.anti_windup,
+                &known.anti_windup,
+                &integrals,
+                inputs,
+            ),
+            (
+                &mut gains.output_feedback,
+                &known.output_feedback,
+                inputs,
+                outputs,
+            ),
         ] {
-            if near(found, derived) {
+            if near(found, derived, rows, columns) {
                 *found = derived.clone();
             }
         }
@@ -206,6 +222,24 @@ fn of_the_paper_with_an_internal_model() {
 #[test]
 fn of_a_plant_from_logs() {
     every_leaf_of("logged.toml");
+}
+
+/// Inputs, outputs and states in units twelve decades apart: what is small by its unit is looked at, too.
+#[test]
+fn of_a_plant_in_si_units() {
+    every_leaf("si_units", &common::other_design("si_units.toml"), "");
+}
+
+#[test]
+fn of_a_servo_with_bumpless_transfer() {
+    let design = common::other_design("bumpless_servo.toml");
+    assert!(design.controller.feedback.transfer.is_some());
+    every_leaf("bumpless_servo", &design, "");
+}
+
+#[test]
+fn of_a_design_that_finds_its_mode() {
+    every_leaf("found_mode", &common::other_design("found_mode.toml"), "");
 }
 
 /// With the default estimator, whose settings the other examples do not hold: all that the controller runs on.

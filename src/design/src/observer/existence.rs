@@ -3,7 +3,8 @@
 use crate::RequestError;
 use crate::augmented::scaled;
 use crate::matrices::dense;
-use crate::matrices::pseudo_inverse;
+use crate::matrices::pseudo_inverse_in;
+use crate::units::power_of_two;
 use ftc_plant::{Mode, SwitchedPlant};
 use nalgebra::DMatrix;
 
@@ -27,16 +28,17 @@ impl PerUnit<'_> {
         scaled(&mode.c, self.outputs, self.states)
     }
 
-    /// `E` of a mode with its columns brought to length one: their scale is the disturbance's own.
+    /// `E` of a mode with its columns brought near length one: their scale is the disturbance's own.
     fn e(&self, mode: &Mode) -> DMatrix<f64> {
-        let mut e = scaled(&mode.e, self.states, &vec![1.0; mode.e.ncols()]);
-        for mut column in e.column_iter_mut() {
-            let norm = column.norm();
-            if norm > 0.0 {
-                column /= norm;
-            }
-        }
-        e
+        scaled(&mode.e, self.states, &self.disturbances(mode))
+    }
+
+    /// The units of a mode's disturbances (s), in which the columns of `E` are near one.
+    fn disturbances(&self, mode: &Mode) -> Vec<f64> {
+        let e = scaled(&mode.e, self.states, &vec![1.0; mode.e.ncols()]);
+        e.column_iter()
+            .map(|column| 1.0 / power_of_two(column.norm()))
+            .collect()
     }
 
     /// `H` (physical units) in per-unit.
@@ -60,7 +62,8 @@ pub(super) fn decoupling(
             entered
                 .map(|(j, entered)| {
                     check_rank(units, (i, left), (j, entered))?;
-                    Ok(&left.e * pseudo_inverse(&(&entered.c * &left.e), RANK_TOLERANCE))
+                    let (seen, own) = (&entered.c * &left.e, units.disturbances(left));
+                    Ok(&left.e * pseudo_inverse_in(&seen, units.outputs, &own, RANK_TOLERANCE))
                 })
                 .collect()
         })

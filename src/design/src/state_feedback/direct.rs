@@ -13,8 +13,9 @@ const LARGEST_WORK: f64 = 6e11;
 /// Iterations of all solutions of one problem.
 const ITERATIONS: f64 = 45.0;
 
-/// Augmented states of all modes up to which the general solver is asked where this one leaves doubt.
-const SMALL: usize = 24;
+/// Augmented states of one mode, and of all together, up to which the general solver is asked where this
+/// one leaves doubt: its work grows with the sixth power of the first.
+const SMALL: [usize; 2] = [9, 24];
 
 /// How many points of the central path are tried.
 const CENTRED: usize = 5;
@@ -209,11 +210,18 @@ impl Problem<'_> {
         let floor = transformation.view_level(REJECTION.powi(2));
         let view = transformation.view(models);
         let path = structured::least_level(&view, self.spec, group, floor, &self.run).ok()?;
-        let (level, bound) = (
+        let (level, mut bound) = (
             transformation.restore_level(path.level),
             transformation.restore_level(path.bound),
         );
-        let optimal = level < (1.0 + AGREEMENT) * bound.max(REJECTION.powi(2));
+        let settles = |bound: f64| level < (1.0 + AGREEMENT) * bound.max(REJECTION.powi(2));
+        if !settles(bound) {
+            // The dual solution tells too little; each mode alone may tell more.
+            let modes = group.iter().filter_map(|&mode| riccati::bound(&view[mode]));
+            let alone = modes.fold(0.0, f64::max);
+            bound = bound.max(transformation.restore_level(alone)).min(level);
+        }
+        let optimal = settles(bound);
         let centred: Vec<_> = path
             .centred
             .into_iter()
@@ -272,7 +280,9 @@ impl Problem<'_> {
 
     /// Whether the general solver would answer in seconds.
     pub(super) fn is_small(&self) -> bool {
-        self.models[0].a.nrows() * self.models.len() <= SMALL
+        let size = self.models[0].a.nrows();
+        let [one, all] = SMALL;
+        size <= one && size * self.models.len() <= all
     }
 
     /// Floating-point operations of a `dwell` design by the interior-point method.

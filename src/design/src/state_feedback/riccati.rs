@@ -50,14 +50,7 @@ struct Solved {
 /// A level near the least one at which `decay` is proved as well; `None` where the equations do not apply
 /// or have no solution.
 pub(super) fn game(model: &AugmentedMode, mode: usize, decay: f64) -> Option<Game> {
-    let weight = model.d.tr_mul(&model.d);
-    let crossed = model.h.tr_mul(&model.d).amax() > 0.0;
-    let inverse = weight.cholesky().filter(|_| !crossed)?.inverse();
-    let data = Data {
-        model,
-        acting: &model.b * inverse,
-        cost: model.h.tr_mul(&model.h),
-    };
+    let data = Data::of(model)?;
     let (bound, _) = data.least(1.0, 0.0, None, ACCURACY)?;
     let level_at =
         |rate: f64, accuracy: f64| data.least(rate, COST_ADDITION, Some(bound), accuracy);
@@ -81,7 +74,26 @@ pub(super) fn game(model: &AugmentedMode, mode: usize, decay: f64) -> Option<Gam
     data.finish(level, bound, solved, mode)
 }
 
-impl Data<'_> {
+/// A level below which no gains of this mode reach, with or without decay; `None` where the equations
+/// do not apply or have no solution.
+pub(super) fn bound(model: &AugmentedMode) -> Option<f64> {
+    let (least, _) = Data::of(model)?.least(1.0, 0.0, None, ACCURACY)?;
+    Some(least / (1.0 + ACCURACY))
+}
+
+impl<'a> Data<'a> {
+    /// `None` where inputs have no weight, or one together with states.
+    fn of(model: &'a AugmentedMode) -> Option<Self> {
+        let weight = model.d.tr_mul(&model.d);
+        let crossed = model.h.tr_mul(&model.d).amax() > 0.0;
+        let inverse = weight.cholesky().filter(|_| !crossed)?.inverse();
+        Some(Self {
+            model,
+            acting: &model.b * inverse,
+            cost: model.h.tr_mul(&model.h),
+        })
+    }
+
     /// The least level on `A/rate`, `B/rate` with so much `room` in the cost, from above, and the solution
     /// there.
     fn least(

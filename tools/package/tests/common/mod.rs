@@ -6,10 +6,20 @@ use ftc_design::assembly::{Request, assemble};
 use std::path::Path;
 
 fn request(example: &str) -> Request {
+    read("../../examples", example)
+}
+
+fn read(folder: &str, name: &str) -> Request {
     let path = Path::new(env!("CARGO_MANIFEST_DIR"))
-        .join("../../examples")
-        .join(example);
+        .join(folder)
+        .join(name);
     design_file::read(&path).unwrap().request
+}
+
+/// A design of `tests/designs` that is no example.
+#[allow(dead_code)]
+pub fn other_design(name: &str) -> Design {
+    assemble(read("tests/designs", name)).unwrap()
 }
 
 /// An example, designed.
