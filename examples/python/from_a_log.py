@@ -72,9 +72,9 @@ def main() -> None:
     print(design)
     errors = np.abs(try_on_the_plant(design))
     settled = np.r_[50:300, 350:600]
-    print(f"largest true error on the plant itself, while a sensor is off by {FAULT} cm: {errors[settled].max():.2f} cm")
+    print(f"largest true error on the plant, while a sensor is off by {FAULT} cm: {errors[settled].max():.2f} cm")
     if errors[settled].max() > FAULT / 3.0:
-        raise SystemExit("the controller follows the lying sensor")
+        raise SystemExit("the controller follows the faulty sensor")
     for path in design.export(arguments.out):
         print(f"wrote {path}")
 
