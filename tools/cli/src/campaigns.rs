@@ -244,8 +244,6 @@ fn work(design: &Design, arguments: &Arguments, quiet: bool) -> Result<(Partial,
     Ok((whole, range.end - range.start))
 }
 
-/// An interrupt stops the campaign and keeps what is done; a second one ends the program.
-
 /// The Parquet file, under another name until it is complete.
 struct Rows {
     writer: RowWriter<std::fs::File>,
