@@ -1,4 +1,4 @@
-//! The promise survives a wrong model: gains from matrices that are off by 10 %, the predictor from
+//! The promise survives a wrong model: gains from matrices that are off by 10 %, the estimator from
 //! a healthy log of the true plant, and still as good as being told the fault.
 //!
 //! promise: model-error
@@ -38,8 +38,13 @@ fn disturbed(plant: &SwitchedPlant, draw: u64) -> SwitchedPlant {
     wrong
 }
 
-/// A design for `model`, with a database logged on `truth` under its disturbance.
-fn design(model: &SwitchedPlant, truth: &SwitchedPlant, noise: f64) -> Design {
+/// A design for `model`, with a database logged on `truth`.
+fn design(
+    method: EstimatorMethod,
+    model: &SwitchedPlant,
+    truth: &SwitchedPlant,
+    noise: f64,
+) -> Design {
     let dims = model.dimensions();
     let samples = RESPONSE + commissioning::commissioning_samples(dims.inputs, RESPONSE);
     let log = |(mode, seed): (&ftc_plant::Mode, u64)| {
@@ -67,7 +72,7 @@ fn design(model: &SwitchedPlant, truth: &SwitchedPlant, noise: f64) -> Design {
         feedforward: true,
         observer,
         estimator: EstimatorSpec {
-            method: EstimatorMethod::Reference,
+            method,
             response_length: Some(RESPONSE),
             database: DatabaseSource::Recorded(
                 truth
@@ -94,16 +99,16 @@ fn design(model: &SwitchedPlant, truth: &SwitchedPlant, noise: f64) -> Design {
     .unwrap()
 }
 
-#[test]
-fn as_good_as_being_told_the_fault_with_matrices_wrong_by_a_tenth() {
-    let mut worst: f64 = 0.0;
+/// The true squared error over that of the loop told the fault, worst of all draws first.
+fn ratios(method: EstimatorMethod) -> Vec<f64> {
+    let mut found = Vec::new();
     for channel in [Channel::State, Channel::Output] {
         let truth = plant(channel);
         for draw in 0..DRAWS {
             let model = disturbed(&truth, draw);
             for noise in [0.0, 0.005] {
-                let controller =
-                    Controller::new(design(&model, &truth, noise).parameters()).unwrap();
+                let design = design(method, &model, &truth, noise);
+                let controller = Controller::new(design.parameters()).unwrap();
                 for name in REFERENCES {
                     let truth = TruePlant::Linear {
                         plant: truth.clone(),
@@ -120,15 +125,27 @@ fn as_good_as_being_told_the_fault_with_matrices_wrong_by_a_tenth() {
                             .map(|m| m.truth.mse)
                             .sum()
                     };
-                    let ratio = error(Variant::Ftc) / error(Variant::ToldTheFault);
-                    worst = worst.max(ratio);
-                    assert!(
-                        ratio <= 1.05,
-                        "{channel:?}, {name}, noise {noise}, draw {draw}: {ratio}"
-                    );
+                    found.push(error(Variant::Ftc) / error(Variant::ToldTheFault));
                 }
             }
         }
     }
-    println!("worst ratio {worst:.4}");
+    found.sort_by(|a, b| b.total_cmp(a));
+    println!("{method:?}: worst {:.4?}", &found[..found.len() / 20]);
+    found
+}
+
+#[test]
+fn as_good_as_being_told_the_fault_with_matrices_wrong_by_a_tenth() {
+    let found = ratios(EstimatorMethod::Reference);
+    assert!(found[0] <= 1.05, "{}", found[0]);
+}
+
+/// The state-based estimator, whose model is fitted to the log.
+///
+/// promise: fitted-model
+#[test]
+fn the_same_with_the_model_fitted_to_the_log() {
+    let found = ratios(EstimatorMethod::Observer);
+    assert!(found[found.len() / 20] <= 1.1, "{found:?}");
 }

@@ -333,6 +333,18 @@ fn hypotheses(settings: &Hypotheses, sizes: Sizes) -> Checked {
             .all(|value| (0.0..=LARGEST_SIZE).contains(value));
         range(sensible, field, "must hold numbers from 0 to 1e50")?;
     }
+    if !settings.fitted.is_empty() {
+        length(
+            "estimator.hypotheses.fitted",
+            settings.fitted.len(),
+            sizes.modes,
+        )?;
+    }
+    for (index, fitted) in settings.fitted.iter().enumerate() {
+        let field = |name: &str| format!("estimator.hypotheses.fitted[{index}].{name}");
+        shape(field("a"), &fitted.a, (n, n))?;
+        shape(field("b"), &fitted.b, (n, m))?;
+    }
     range(
         settings.mode_rate.is_none() || sizes.modes <= MOST_MODES,
         "estimator.hypotheses.mode_rate",

@@ -295,6 +295,22 @@ pub struct Hypotheses {
     pub authority: Vec<f64>,
     /// What is done about a slow divergence.
     pub ambiguous: Ambiguous,
+    /// What logs say of each mode in place of the plant's matrices; empty without logs.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub fitted: Vec<FittedMode>,
+}
+
+/// A mode's matrices as logs of healthy operation have them, about the plant's operating point.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct FittedMode {
+    /// `A` (n x n).
+    pub a: Matrix,
+    /// `B` (n x m).
+    pub b: Matrix,
+    /// How much of what each output (p) did in the part of the log held back they explain, in percent.
+    pub fit: Vec<f64>,
+    /// The same of the plant's own matrices.
+    pub fit_of_model: Vec<f64>,
 }
 
 impl Hypotheses {

@@ -1,6 +1,7 @@
 //! From what is asked for to a finished design: gains, observer, predictor, thresholds, record.
 
 use super::commissioning::{self, Database, LONGEST_RESPONSE, RecordedDisturbance};
+use super::grey_box::{self, Fit, Unusable};
 use super::harmonics;
 pub use super::harmonics::KnownDisturbance;
 use super::hypotheses::{self, HypothesesSpec};
@@ -310,13 +311,15 @@ fn estimator(request: &Request, dims: Dimensions) -> Result<Estimator, RequestEr
         EstimatorMethod::Reference => predictors(request, response_length)?,
         EstimatorMethod::Observer | EstimatorMethod::None | EstimatorMethod::Sliding => Vec::new(),
     };
-    let thresholds = thresholds(
-        &spec.threshold,
-        &predictors,
-        &request.scenario.noise,
-        outputs,
-    );
     let state_based = spec.method == EstimatorMethod::Observer;
+    let fits = match (&spec.database, state_based) {
+        (DatabaseSource::Recorded(logs), true) => fits(request, logs)?,
+        _ => Vec::new(),
+    };
+    let deviations = predictors.iter().map(|predictor| &predictor.deviation);
+    let deviations = deviations.chain(fits.iter().map(|fit| &fit.deviation));
+    let noise = &request.scenario.noise;
+    let thresholds = thresholds(&spec.threshold, deviations, noise, outputs);
     let harmonics = spec
         .disturbance
         .as_ref()
@@ -331,8 +334,13 @@ fn estimator(request: &Request, dims: Dimensions) -> Result<Estimator, RequestEr
         let noise = sensor_noise(&request.scenario.noise, &thresholds);
         let (plant, signals) = (&request.plant, &request.signals);
         let reach = hypotheses::reach(plant, &request.control.tracked, &request.scenario);
-        spec.hypotheses
-            .settings(plant, signals, noise, &reach, known)
+        let mut settings = spec
+            .hypotheses
+            .settings(plant, signals, noise, &reach, known);
+        let errors = fits.iter().map(|fit| fit.model_error);
+        settings.model_error = errors.reduce(f64::max).unwrap_or(settings.model_error);
+        settings.fitted = fits.into_iter().map(|fit| fit.mode).collect();
+        settings
     });
     Ok(Estimator {
         method: spec.method,
@@ -413,6 +421,35 @@ fn predictors(request: &Request, length: usize) -> Result<Vec<Predictor>, Reques
     modes.enumerate().map(predictor).collect()
 }
 
+/// The disturbance while logs were recorded.
+fn recorded_disturbance(request: &Request) -> Option<RecordedDisturbance> {
+    let known = request.estimator.disturbance.as_ref();
+    known.map(|known| RecordedDisturbance {
+        period: known.period / request.plant.sample_time,
+        count: known.harmonics,
+    })
+}
+
+/// What the logs say of each mode.
+fn fits(request: &Request, logs: &[Vec<Database>]) -> Result<Vec<Fit>, RequestError> {
+    let scaling = request.signals.scaling();
+    let disturbance = recorded_disturbance(request);
+    let error = request.estimator.hypotheses.model_error;
+    let modes = request.plant.modes.iter().zip(logs).enumerate();
+    modes
+        .map(|(index, (mode, stretches))| {
+            let found = grey_box::fit(mode, stretches, disturbance, error, &scaling);
+            found.map_err(|unusable| match unusable {
+                Unusable::Short => RequestError::ShortLog {
+                    mode: index + 1,
+                    needed: grey_box::least_samples(mode, disturbance),
+                },
+                Unusable::Late => RequestError::LateLog { mode: index + 1 },
+            })
+        })
+        .collect()
+}
+
 /// The predictor of a log of one mode (from 1), in which the disturbance was at work.
 fn recorded(
     request: &Request,
@@ -420,11 +457,7 @@ fn recorded(
     stretches: &[Database],
     length: usize,
 ) -> Result<Predictor, RequestError> {
-    let known = request.estimator.disturbance.as_ref();
-    let disturbance = known.map(|known| RecordedDisturbance {
-        period: known.period / request.plant.sample_time,
-        count: known.harmonics,
-    });
+    let disturbance = recorded_disturbance(request);
     let inputs = &request.signals.inputs;
     let samples: usize = stretches.iter().map(Database::samples).sum();
     let most = MOST_REGRESSORS / (inputs.len() * length).max(1);
@@ -470,15 +503,15 @@ fn amplitudes(mode: &Mode, inputs: &[Signal]) -> Vec<f64> {
     inputs.iter().zip(point).map(amplitude).collect()
 }
 
-fn thresholds(
+fn thresholds<'a>(
     wanted: &Threshold,
-    predictors: &[Predictor],
+    deviations: impl Iterator<Item = &'a Vec<f64>> + Clone,
     noise: &[f64],
     outputs: &[Signal],
 ) -> Vec<f64> {
     let deviation = |sensor: usize| {
-        let of = |predictor: &Predictor| predictor.deviation[sensor];
-        predictors.iter().map(of).fold(noise[sensor], f64::max)
+        let found = deviations.clone();
+        found.map(|of| of[sensor]).fold(noise[sensor], f64::max)
     };
     match wanted {
         Threshold::Given(values) => values.clone(),

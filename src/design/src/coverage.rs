@@ -26,7 +26,7 @@ const LARGEST: f64 = 1e15;
 
 /// Numbers of a design that `verify` holds against bounds only, in words for its report.
 pub const UNCOVERED: [&str; 7] = [
-    "what the user tells the state-based estimator: model error, fault rate and length, largest correction, loads, the disturbance's size and period",
+    "what the user, or a log, tells the state-based estimator: the plant's matrices as the log has them, model error, fault rate and length, largest correction, loads, the disturbance's size and period",
     "that the mode, told or found from the readings, is the plant's (the claims hold while it is)",
     "the values of the operating points (any are admissible: the claims are about deviations from them)",
     "the ranges of the inputs (the claims hold while no input is at a limit)",
@@ -311,6 +311,7 @@ fn hypotheses_fit(design: &Design) -> bool {
     derived.angles.clone_from(&found.angles);
     derived.release_rate = found.release_rate;
     derived.mode_rate = found.mode_rate;
+    derived.fitted.clone_from(&found.fitted);
     let chosen = (0.0..=1.0).contains(&found.model_error)
         && (1e-12..=0.1).contains(&found.fault_rate)
         && (1e-9..=0.5).contains(&found.release_rate)

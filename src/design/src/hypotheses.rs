@@ -142,6 +142,7 @@ impl HypothesesSpec {
                 .clone()
                 .unwrap_or_else(|| per_sensor(plant, outputs, 1.0, AUTHORITY)),
             ambiguous: self.ambiguous,
+            fitted: Vec::new(),
         }
     }
 }

@@ -42,6 +42,7 @@ mod controllability;
 pub mod coverage;
 #[cfg(feature = "solver")]
 mod feedforward;
+mod grey_box;
 pub mod harmonics;
 #[cfg(feature = "solver")]
 mod hypotheses;

@@ -46,6 +46,24 @@ pub enum RequestError {
         /// The longest.
         most: usize,
     },
+    /// The log of a mode is too short to fit the mode's matrices to.
+    #[error(
+        "mode {mode}: the log has no four stretches of {needed} samples without a gap in this mode: record more of it"
+    )]
+    ShortLog {
+        /// The mode.
+        mode: usize,
+        /// Samples of a stretch.
+        needed: usize,
+    },
+    /// The inputs of a log are commands that act a sample later.
+    #[error(
+        "mode {mode}: the inputs of the log act one sample after the row they stand in: move them down by one row, or log what the plant is given, not the command"
+    )]
+    LateLog {
+        /// The mode.
+        mode: usize,
+    },
     /// The log of a mode is longer than the least-squares problem can be.
     #[error(
         "mode {mode}: the log has {samples} samples, more than are needed: shorten it to at most {most}"

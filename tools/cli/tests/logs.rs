@@ -661,6 +661,53 @@ fn files_that_do_not_fit_the_modes() {
     fs_refused_method(&pair);
 }
 
+/// The state-based estimator fits its model to the log, and says how well.
+///
+/// promise: fitted-model
+#[test]
+fn the_default_estimator_fits_its_model_to_the_log() {
+    let example = std::path::Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../../examples"));
+    let text = fs::read_to_string(example.join("logged.toml")).unwrap();
+    let text = text
+        .replace("method = \"reference\"", "model_error = 0.1")
+        .replace("0.60, 0.0", "0.65, 0.0");
+    let logs = ["logged_closed.csv", "logged_open.csv"]
+        .map(|name| (name, fs::read_to_string(example.join(name)).unwrap()));
+    let files: Vec<(&str, &str)> = logs.iter().map(|(name, log)| (*name, &**log)).collect();
+    let bench = Bench::new(&text);
+    for (name, log) in &files {
+        fs::write(bench.path(name), log).unwrap();
+    }
+    let run = bench.run(&["design", FILE]);
+    assert_eq!(run.code(), 0, "{}", run.stderr());
+    let said = run.stdout();
+    assert!(said.contains("left after the fit to the log"), "{said}");
+    assert!(said.contains("fit in mode valve closed"), "{said}");
+    // Commands that act a sample later are no inputs of the rows they stand in.
+    let (head, rows) = logs[0].1.split_once('\n').unwrap();
+    let rows: Vec<Vec<&str>> = rows.lines().map(|row| row.split(',').collect()).collect();
+    let names: Vec<&str> = head.split(',').collect();
+    let early: Vec<String> = rows
+        .windows(2)
+        .map(|pair| {
+            let cell = |at: usize| match names[at].trim_matches('"').starts_with("pump") {
+                true => pair[1][at],
+                false => pair[0][at],
+            };
+            (0..names.len()).map(cell).collect::<Vec<_>>().join(",")
+        })
+        .collect();
+    let early = format!("{head}\n{}\n", early.join("\n"));
+    fs::write(bench.path("logged_closed.csv"), early).unwrap();
+    let run = bench.run(&["design", FILE]);
+    assert_eq!(run.code(), 2, "{}", run.stdout());
+    assert!(
+        run.stderr().contains("one sample after the row"),
+        "{}",
+        run.stderr()
+    );
+}
+
 /// A log that no estimator uses is refused rather than ignored.
 fn fs_refused_method(pair: &[(&str, &str)]) {
     let bench = bench(PAIR, pair);
@@ -670,7 +717,8 @@ fn fs_refused_method(pair: &[(&str, &str)]) {
     let run = bench.run(&["design", FILE]);
     assert_eq!(run.code(), 2, "{}", run.stdout());
     assert!(
-        run.stderr().contains("method = \"reference\""),
+        run.stderr()
+            .contains("methods \"observer\" and \"reference\""),
         "{}",
         run.stderr()
     );

@@ -193,6 +193,24 @@ fn found_mode(design: &Design, settings: &Hypotheses) -> Vec<(String, String)> {
     lines
 }
 
+/// What the log says of each mode.
+fn fitted(design: &Design, settings: &Hypotheses) -> Vec<(String, String)> {
+    let percents = |values: &[f64]| {
+        let values = values.iter().map(|value| format!("{value:.1} %"));
+        values.collect::<Vec<_>>().join(", ")
+    };
+    let modes = design.plant.modes.iter().zip(&settings.fitted);
+    modes
+        .map(|(mode, fitted)| {
+            let (fit, model) = (percents(&fitted.fit), percents(&fitted.fit_of_model));
+            line(
+                format!("fit in mode {}", mode.name),
+                format!("{fit} of the outputs on data held back; the design model {model}"),
+            )
+        })
+        .collect()
+}
+
 fn estimator(design: &Design) -> Vec<(String, String)> {
     let estimator = &design.controller.estimator;
     let method = match estimator.method {
@@ -207,13 +225,16 @@ fn estimator(design: &Design) -> Vec<(String, String)> {
     }
     let outputs = &design.signals.outputs;
     if let Some(settings) = &estimator.hypotheses {
+        let source = match settings.fitted.is_empty() {
+            true => "assumed",
+            false => "left after the fit to the log",
+        };
+        let error = number(100.0 * settings.model_error);
         lines.push(line(
             "model error",
-            format!(
-                "{} % of each entry, assumed",
-                number(100.0 * settings.model_error)
-            ),
+            format!("{error} % of each entry, {source}"),
         ));
+        lines.extend(fitted(design, settings));
         lines.push(line(
             "fault rate",
             format!("{:e} a sample and sensor", settings.fault_rate),

@@ -139,6 +139,21 @@ fn model(layout: Layout, mode: &Described, settings: &Hypotheses) -> ModeModel {
     )
 }
 
+/// The modes, with what logs say of them.
+fn as_fitted<'a>(
+    modes: &'a [Described],
+    settings: &'a Hypotheses,
+) -> impl Iterator<Item = Described> + 'a {
+    modes.iter().enumerate().map(|(at, mode)| {
+        let mut mode = mode.clone();
+        if let Some(fitted) = settings.fitted.get(at) {
+            mode.a.clone_from(&fitted.a);
+            mode.b.clone_from(&fitted.b);
+        }
+        mode
+    })
+}
+
 /// Per pair of the disturbance's `d` states: the error of its angle, and the least growth of its variance.
 fn waves_of(settings: &Hypotheses, d: usize) -> Vec<(f64, f64)> {
     let sizes = settings.disturbance_size.iter().step_by(2);
@@ -165,7 +180,6 @@ impl Bank {
             d,
             s: disturbances,
         };
-        let described = modes.iter();
         let ln = libm::log;
         let turn = |_| {
             settings
@@ -173,8 +187,8 @@ impl Bank {
                 .iter()
                 .map(|&angle| (libm::cos(angle), libm::sin(angle)))
         };
-        let modes: Vec<ModeModel> = described
-            .map(|mode| model(layout, mode, settings))
+        let modes: Vec<ModeModel> = as_fitted(modes, settings)
+            .map(|mode| model(layout, &mode, settings))
             .collect();
         let pairs = modes
             .iter()
