@@ -5,16 +5,15 @@ use super::grey_box::{self, Fit, Unusable};
 use super::harmonics;
 pub use super::harmonics::KnownDisturbance;
 use super::hypotheses::{self, HypothesesSpec};
-use super::matrices::{dense, plain};
 use super::{
     CertificateError, ControlSpec, ControllerDesign, Design, DesignError, FORMAT, Failure,
     ObserverSpec, RequestError, Run, Signal, Signals, check_controllable, synthesise_with,
 };
 use crate::coverage;
-use crate::running_loop::{TRANSFER_DECAY, TransferCertificate};
+use crate::derived::{LEVERAGE_LIMIT, feedback, largest_faults, sensor_noise};
 use crate::work::Work;
 use ftc_control::parameters::{
-    Compensation, Estimator, EstimatorMethod, Harmonics, Limits, Predictor, StateFeedback, Transfer,
+    Compensation, Estimator, EstimatorMethod, Harmonics, Limits, Predictor,
 };
 use ftc_plant::{Dimensions, Mode, SwitchedPlant};
 use ftc_plant::{Scenario, TruePlant};
@@ -131,15 +130,6 @@ pub enum Threshold {
 /// The smallest threshold that is chosen automatically, relative to the nominal value.
 const SMALLEST_THRESHOLD: f64 = 1e-3;
 
-/// How many noise deviations a threshold usually is.
-const USUAL_SIGMAS: f64 = 6.0;
-
-/// Noise that the state-based estimator believes in at least, relative to the threshold.
-const SMALLEST_NOISE: f64 = 0.05;
-
-/// Leverage beyond which the residual is not trusted.
-pub(crate) const LEVERAGE_LIMIT: f64 = 100.0;
-
 /// A threshold opens by so much more than the largest known response to the disturbance before that
 /// is learned. While least squares learns, what is left of any such response stays below `1 / OPENING_FACTOR` of
 /// that opening (Cauchy-Schwarz), hence below the half from which the estimator learns.
@@ -147,12 +137,6 @@ const OPENING_FACTOR: f64 = 2.5;
 
 /// Variance of a harmonic of which nothing is known, in units of the noise variance.
 const UNKNOWN_VARIANCE: f64 = 1e6;
-
-/// Share of what saturation took off that unwinds the integrator in one sample.
-const UNWINDING: f64 = 0.5;
-
-/// Largest fault of a sensor without a range, relative to the nominal value of its output.
-const LARGEST_FAULT: f64 = 1e6;
 
 /// Seed of the commissioning run; any will do, but the same design must give the same bytes.
 const COMMISSIONING_SEED: u64 = 20;
@@ -268,37 +252,6 @@ fn observer_noise(request: &Request) -> Vec<f64> {
         .collect()
 }
 
-/// The certified gains as the controller runs them, with or without reference feedforward. What saturation takes off an input unwinds
-/// the integral by half of what would undo it; inputs without a limit never saturate.
-pub fn feedback(
-    control: &super::StateFeedback,
-    plant: &SwitchedPlant,
-    transfer: Option<&TransferCertificate>,
-    feedforward: bool,
-    limits: &[Limits],
-) -> StateFeedback {
-    let mut feedback = control.for_controller(plant);
-    feedback.transfer = transfer.map(|proved| Transfer {
-        samples: proved.samples(),
-        decay: TRANSFER_DECAY,
-    });
-    if feedforward {
-        let found = super::feedforward::feedforward(plant, control);
-        for (gains, gain) in feedback.modes.iter_mut().zip(found) {
-            gains.feedforward = plain(&gain);
-        }
-    }
-    for gains in &mut feedback.modes {
-        let mut unwinding = dense(&gains.anti_windup);
-        for (mut column, limit) in unwinding.column_iter_mut().zip(limits) {
-            let limited = limit.min.is_some() || limit.max.is_some();
-            column *= if limited { UNWINDING } else { 0.0 };
-        }
-        gains.anti_windup = plain(&unwinding);
-    }
-    feedback
-}
-
 /// Predictors, thresholds and harmonics.
 fn estimator(request: &Request, dims: Dimensions) -> Result<Estimator, RequestError> {
     let spec = &request.estimator;
@@ -357,18 +310,6 @@ fn estimator(request: &Request, dims: Dimensions) -> Result<Estimator, RequestEr
         leverage_limit: LEVERAGE_LIMIT,
         largest_fault: largest_faults(outputs),
     })
-}
-
-/// Standard deviation of each sensor's noise (p) for the state-based estimator: that of the scenario, and
-/// never below what the smallest threshold stands for.
-pub(crate) fn sensor_noise(given: &[f64], thresholds: &[f64]) -> Vec<f64> {
-    let sensors = given.iter().zip(thresholds);
-    sensors
-        .map(|(&noise, &threshold)| match noise > 0.0 {
-            true => noise.max(SMALLEST_NOISE * threshold),
-            false => threshold / USUAL_SIGMAS,
-        })
-        .collect()
 }
 
 /// The response length asked for, or the one after which the response has decayed.
@@ -546,14 +487,4 @@ fn known_harmonics(
             .unwrap_or(UNKNOWN_VARIANCE)
             .clamp(1.0, UNKNOWN_VARIANCE),
     }
-}
-
-/// The largest estimate of each sensor's fault (p).
-pub(crate) fn largest_faults(outputs: &[Signal]) -> Vec<f64> {
-    outputs.iter().map(largest_fault).collect()
-}
-
-fn largest_fault(output: &Signal) -> f64 {
-    let range = output.max.zip(output.min).map(|(max, min)| max - min);
-    range.unwrap_or(LARGEST_FAULT * output.nominal)
 }

@@ -3,9 +3,9 @@
 //! What the inequalities say nothing about is derived again from the plant and the certified gains, or
 //! held against a relation that it must satisfy. [`UNCOVERED`] names what is left.
 
-use crate::assembly::{self, KnownDisturbance};
 use crate::augmented::scaled;
-use crate::harmonics;
+use crate::derived;
+use crate::harmonics::{self, KnownDisturbance};
 use crate::hypotheses;
 use crate::matrices::dense;
 use crate::observer::{check_decoupling, lost_gains_fit};
@@ -119,7 +119,7 @@ fn close(found: &Matrix, derived: &Matrix, rows: &[f64], columns: &[f64], tolera
 
 fn check_feedback(design: &Design, synthesis: &Synthesis) -> Result<(), CoverageError> {
     let (running, proved) = (&design.controller.feedback, &synthesis.state_feedback);
-    let derived = assembly::feedback(
+    let derived = derived::feedback(
         proved,
         &design.plant,
         synthesis.running_loop.transfer.as_ref(),
@@ -248,7 +248,7 @@ fn check_limits(design: &Design) -> Result<(), CoverageError> {
         _ => true,
     });
     let estimator = &design.controller.estimator;
-    let faults = assembly::largest_faults(outputs);
+    let faults = derived::largest_faults(outputs);
     all(&[
         (ordered, "a limit"),
         (estimator.largest_fault == faults, "the largest fault"),
@@ -262,7 +262,7 @@ fn check_estimator(design: &Design) -> Result<(), CoverageError> {
     all(&[
         (estimator.thresholds.iter().all(threshold), "a threshold"),
         (
-            estimator.leverage_limit == assembly::LEVERAGE_LIMIT,
+            estimator.leverage_limit == derived::LEVERAGE_LIMIT,
             "the limit of the leverage",
         ),
         (
@@ -302,7 +302,7 @@ fn hypotheses_fit(design: &Design) -> bool {
         harmonics: found.angles.len(),
         amplitude: Some(found.disturbance_load.clone()),
     });
-    let noise = assembly::sensor_noise(&design.scenario.noise, &estimator.thresholds);
+    let noise = derived::sensor_noise(&design.scenario.noise, &estimator.thresholds);
     let tracked = &design.controller.feedback.tracked;
     let reach = hypotheses::reach(plant, tracked, &design.scenario);
     let mut derived = spec.settings(plant, &design.signals, noise, &reach, known.as_ref());

@@ -41,7 +41,10 @@ mod controllability;
 #[cfg(feature = "solver")]
 pub mod coverage;
 #[cfg(feature = "solver")]
+pub mod derived;
+#[cfg(feature = "solver")]
 mod feedforward;
+#[cfg(feature = "solver")]
 mod grey_box;
 pub mod harmonics;
 #[cfg(feature = "solver")]

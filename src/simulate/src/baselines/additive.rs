@@ -2,7 +2,7 @@
 
 use ftc_control::ControllerParameters;
 use ftc_control::parameters::Compensation;
-use ftc_design::assembly::feedback;
+use ftc_design::derived::feedback;
 use ftc_design::{ControlSpec, Design, DesignError, Objective, RequestError, state_feedback};
 
 /// The same controller with the gains of T1 (decay only, no attenuation of the disturbance) and

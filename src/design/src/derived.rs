@@ -1,0 +1,77 @@
+//! What a controller holds beside its certified gains, derived from them, the plant and the signals: here when it is
+//! assembled, and again when it is checked.
+
+use crate::Signal;
+use crate::feedforward;
+use crate::matrices::{dense, plain};
+use crate::running_loop::{TRANSFER_DECAY, TransferCertificate};
+use ftc_control::parameters::{Limits, StateFeedback, Transfer};
+use ftc_plant::SwitchedPlant;
+
+/// Noise that the state-based estimator assumes at least, relative to the threshold.
+const SMALLEST_NOISE: f64 = 0.05;
+
+/// How many noise deviations a threshold usually is.
+const USUAL_SIGMAS: f64 = 6.0;
+
+/// Leverage beyond which the residual is not trusted.
+pub(crate) const LEVERAGE_LIMIT: f64 = 100.0;
+
+/// Share of what saturation took off that unwinds the integrator in one sample.
+const UNWINDING: f64 = 0.5;
+
+/// Largest fault of a sensor without a range, relative to the nominal value of its output.
+const LARGEST_FAULT: f64 = 1e6;
+
+/// The certified gains as the controller runs them, with or without reference feedforward. What saturation takes off an input unwinds
+/// the integral by half of what would undo it; inputs without a limit never saturate.
+pub fn feedback(
+    control: &crate::StateFeedback,
+    plant: &SwitchedPlant,
+    transfer: Option<&TransferCertificate>,
+    feedforward: bool,
+    limits: &[Limits],
+) -> StateFeedback {
+    let mut feedback = control.for_controller(plant);
+    feedback.transfer = transfer.map(|proved| Transfer {
+        samples: proved.samples(),
+        decay: TRANSFER_DECAY,
+    });
+    if feedforward {
+        let found = feedforward::feedforward(plant, control);
+        for (gains, gain) in feedback.modes.iter_mut().zip(found) {
+            gains.feedforward = plain(&gain);
+        }
+    }
+    for gains in &mut feedback.modes {
+        let mut unwinding = dense(&gains.anti_windup);
+        for (mut column, limit) in unwinding.column_iter_mut().zip(limits) {
+            let limited = limit.min.is_some() || limit.max.is_some();
+            column *= if limited { UNWINDING } else { 0.0 };
+        }
+        gains.anti_windup = plain(&unwinding);
+    }
+    feedback
+}
+
+/// Standard deviation of each sensor's noise (p) for the state-based estimator: that of the scenario, and
+/// never below what the smallest threshold stands for.
+pub(crate) fn sensor_noise(given: &[f64], thresholds: &[f64]) -> Vec<f64> {
+    let sensors = given.iter().zip(thresholds);
+    sensors
+        .map(|(&noise, &threshold)| match noise > 0.0 {
+            true => noise.max(SMALLEST_NOISE * threshold),
+            false => threshold / USUAL_SIGMAS,
+        })
+        .collect()
+}
+
+/// The largest estimate of each sensor's fault (p).
+pub(crate) fn largest_faults(outputs: &[Signal]) -> Vec<f64> {
+    outputs.iter().map(largest_fault).collect()
+}
+
+fn largest_fault(output: &Signal) -> f64 {
+    let range = output.max.zip(output.min).map(|(max, min)| max - min);
+    range.unwrap_or(LARGEST_FAULT * output.nominal)
+}
