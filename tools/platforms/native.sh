@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
-# Puts the FMU binaries of `make build` where the exporter looks first, unless portable ones are
-# there that are not older; those stay and count as built anew.
+# Puts the FMU binaries of `make build` where the exporter looks first. Where they are those of the last time,
+# what is there stays, portable ones for instance, and counts as built anew.
 set -euo pipefail
 cd "$(dirname "$0")/../.."
 
@@ -11,9 +11,14 @@ aarch64) platform=aarch64-linux ;;
 *) exit 0 ;;
 esac
 folder=target/release/fmu-binaries/$platform
-mkdir -p "$folder"
+last=target/release/fmu-binaries/native
+mkdir -p "$folder" "$last"
 for name in ftc_controller ftc_plant; do
-    library=lib${name}_fmu.so
-    cp --update "target/release/$library" "$folder/$name.so"
+    library=target/release/lib${name}_fmu.so
+    # Tests build this library, too, with other features: the same sources may have been linked anew.
+    if ! cmp --silent "$library" "$last/$name.so"; then
+        cp "$library" "$last/$name.so"
+        cp "$library" "$folder/$name.so"
+    fi
     touch "$folder/$name.so"
 done
