@@ -35,7 +35,7 @@ pub fn write_design(design: &Design) -> Result<Vec<u8>, DesignFileError> {
     Ok(rmp_serde::to_vec_named(&running)?)
 }
 
-/// [`Design`] without its proof: reading that, too, would be half of the code of a binary.
+/// [`Design`] without its proof, which is not there: to be able to read it, too, took a seventh of a binary.
 #[derive(Deserialize)]
 struct Running {
     format: u32,

@@ -16,7 +16,7 @@ mkdir -p "$folder" "$last"
 for name in ftc_controller ftc_plant; do
     library=target/release/lib${name}_fmu.so
     # Tests build this library, too, with other features: the same sources may have been linked anew.
-    if ! cmp --silent "$library" "$last/$name.so"; then
+    if [ ! -f "$folder/$name.so" ] || ! cmp --silent "$library" "$last/$name.so"; then
         cp "$library" "$last/$name.so"
         cp "$library" "$folder/$name.so"
     fi

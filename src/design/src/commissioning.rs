@@ -191,6 +191,18 @@ pub struct RecordedDisturbance {
     pub count: usize,
 }
 
+impl RecordedDisturbance {
+    /// Sine and cosine of each harmonic in turn, by `column`, at sample `k`.
+    pub(crate) fn wave(self, k: usize, column: usize) -> f64 {
+        let angle = core::f64::consts::TAU * (column / 2 + 1) as f64 * k as f64 / self.period;
+        if column.is_multiple_of(2) {
+            angle.sin()
+        } else {
+            angle.cos()
+        }
+    }
+}
+
 /// The predictor of a database by least squares: [`predictor_of_stretches`] with a single one.
 ///
 /// # Errors
@@ -233,19 +245,10 @@ pub fn predictor_of_stretches(
     if samples <= unknowns {
         return Err(too_few(stretches, unknowns, response_length));
     }
-    let wave = |k: usize, column: usize| {
-        let period = disturbance.map_or(1.0, |known| known.period);
-        let angle = core::f64::consts::TAU * (column / 2 + 1) as f64 * k as f64 / period;
-        if column.is_multiple_of(2) {
-            angle.sin()
-        } else {
-            angle.cos()
-        }
-    };
     let regressors = DMatrix::from_fn(samples, unknowns, |row, column| {
         let (stretch, k) = windows[row];
         match column.checked_sub(waves) {
-            None => wave(stretch.first + k, column),
+            None => disturbance.map_or(0.0, |known| known.wave(stretch.first + k, column)),
             Some(past) => stretch.inputs[(k + past / m, past % m)],
         }
     });

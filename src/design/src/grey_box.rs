@@ -6,6 +6,7 @@
 //! design model, entry by entry, relative to the error that the model may have. Gauss-Newton with the windows'
 //! own unknowns projected out.
 
+use crate::augmented::scaled;
 use crate::commissioning::{Database, RecordedDisturbance};
 use crate::matrices::plain;
 use ftc_control::parameters::FittedMode;
@@ -55,12 +56,14 @@ struct Window {
     waves: DMatrix<f64>,
 }
 
-/// A window under given matrices, rows in units of the sensors' deviations.
+/// A window under given matrices, outputs in units of the sensors' deviations.
 struct Explained {
     /// What is left of the readings (samples p).
     rest: DVector<f64>,
-    /// How the rest falls with each parameter, without what the window's own unknowns can do (samples p x parameters).
-    slope: DMatrix<f64>,
+    /// An orthonormal basis of what the window's own unknowns can do to the outputs (samples p x unknowns).
+    span: DMatrix<f64>,
+    /// States that explain the readings (n x samples).
+    states: DMatrix<f64>,
 }
 
 /// The mode, and what is asked of the fit.
@@ -94,12 +97,13 @@ pub(crate) fn fit(
     if windows.len() < HELD_BACK {
         return Err(Unusable::Short);
     }
-    let (judges, learn): (Vec<_>, Vec<_>) = windows
-        .into_iter()
-        .enumerate()
-        .partition(|(at, _)| at % HELD_BACK == HELD_BACK - 1);
-    let [judges, learn] = [judges, learn].map(|part| part.into_iter().map(|(_, window)| window));
-    let (judges, learn): (Vec<_>, Vec<_>) = (judges.collect(), learn.collect());
+    let (mut judges, mut learn) = (Vec::new(), Vec::new());
+    for (at, window) in windows.into_iter().enumerate() {
+        match at % HELD_BACK == HELD_BACK - 1 {
+            true => judges.push(window),
+            false => learn.push(window),
+        }
+    }
     let model = parameters(&mode.a, &mode.b);
     let mut grey = GreyBox {
         mode,
@@ -112,26 +116,7 @@ pub(crate) fn fit(
     if variance(&late) < LATE * variance(&learn) {
         return Err(Unusable::Late);
     }
-    let mut theta = model.clone();
-    let mut left = model_error;
-    for _ in 0..ITERATIONS {
-        grey.deviation = grey.unexplained(&learn, &theta);
-        let Some((normal, step)) = grey.step(&learn, &theta, &model) else {
-            break;
-        };
-        let before = grey.cost(&learn, &theta, &model);
-        let shares = (0..6).map(|halvings| 0.5_f64.powi(halvings));
-        let mut tried = shares.map(|share| &theta + share * &step);
-        let Some(better) = tried.find(|next| grey.cost(&learn, next, &model) <= before) else {
-            break;
-        };
-        let gained = before - grey.cost(&learn, &better, &model);
-        theta = better;
-        left = model_error * grey.left(&normal).unwrap_or(1.0).sqrt();
-        if gained <= CONVERGED * before {
-            break;
-        }
-    }
+    let (mut theta, mut left) = grey.improve(&learn, &model, model_error);
     // What was held back decides: a log that the model explains better teaches nothing.
     grey.deviation = grey.unexplained(&judges, &model);
     let (of_model, of_fit) = (grey.rests(&judges, &model), grey.rests(&judges, &theta));
@@ -160,13 +145,10 @@ fn parameters(a: &DMatrix<f64>, b: &DMatrix<f64>) -> DVector<f64> {
 /// The size that the error of each parameter is relative to.
 fn entries(mode: &Mode, scaling: &Scaling) -> DVector<f64> {
     let (x, u) = (&scaling.states, &scaling.inputs);
-    let scaled = |matrix: &DMatrix<f64>, from: &[f64], i: usize, j: usize| {
-        (matrix[(i, j)] * from[j] / x[i]).abs()
-    };
+    let [a, b] = [(&mode.a, x), (&mode.b, u)].map(|(matrix, from)| scaled(matrix, x, from));
     let largest = |i: usize| {
-        let a = (0..x.len()).map(|j| scaled(&mode.a, x, i, j));
-        let b = (0..u.len()).map(|j| scaled(&mode.b, u, i, j));
-        a.chain(b).fold(f64::MIN_POSITIVE.sqrt(), f64::max)
+        let row = a.row(i).amax().max(b.row(i).amax());
+        row.max(f64::MIN_POSITIVE.sqrt())
     };
     let size = |matrix: &DMatrix<f64>, from: &[f64]| {
         DMatrix::from_fn(matrix.nrows(), matrix.ncols(), |i, j| {
@@ -200,17 +182,10 @@ fn windows_of(
 ) -> Vec<Window> {
     let count = disturbance.map_or(0, |known| known.count);
     let length = least_samples(mode, disturbance);
-    let wave = |k: usize, column: usize| {
-        let Some(known) = disturbance.filter(|_| column > 0) else {
-            return 1.0;
-        };
-        let harmonic = column.div_ceil(2) as f64;
-        let angle = core::f64::consts::TAU * harmonic * k as f64 / known.period;
-        if column.is_multiple_of(2) {
-            angle.cos()
-        } else {
-            angle.sin()
-        }
+    // The level first, then the waves.
+    let wave = |k: usize, column: usize| match (disturbance, column.checked_sub(1)) {
+        (Some(known), Some(column)) => known.wave(k, column),
+        _ => 1.0,
     };
     let cut = |stretch: &Database| {
         let starts = (0..stretch.samples() / length).map(|at| at * length);
@@ -227,6 +202,36 @@ fn windows_of(
 }
 
 impl GreyBox<'_> {
+    /// The parameters that explain the windows best, and the relative error of the model that is left.
+    fn improve(
+        &mut self,
+        windows: &[Window],
+        model: &DVector<f64>,
+        model_error: f64,
+    ) -> (DVector<f64>, f64) {
+        let (mut theta, mut left) = (model.clone(), model_error);
+        for _ in 0..ITERATIONS {
+            self.deviation = self.unexplained(windows, &theta);
+            let Some((normal, step)) = self.step(windows, &theta, model) else {
+                break;
+            };
+            let before = self.cost(windows, &theta, model);
+            let mut tried = (0..6).map(|halvings| {
+                let next = &theta + 0.5_f64.powi(halvings) * &step;
+                (self.cost(windows, &next, model), next)
+            });
+            let Some((cost, better)) = tried.find(|(cost, _)| *cost <= before) else {
+                break;
+            };
+            theta = better;
+            left = model_error * self.left(&normal).unwrap_or(1.0).sqrt();
+            if before - cost <= CONVERGED * before {
+                break;
+            }
+        }
+        (theta, left)
+    }
+
     fn matrices(&self, theta: &DVector<f64>) -> (DMatrix<f64>, DMatrix<f64>) {
         let (n, m) = self.mode.b.shape();
         let (a, b) = theta.as_slice().split_at(n * n);
@@ -247,57 +252,53 @@ impl GreyBox<'_> {
         states
     }
 
-    /// The outputs of states (n x samples) in units of the deviations, one below the other.
-    fn seen(&self, states: &DMatrix<f64>) -> DVector<f64> {
-        let mut outputs = &self.mode.c * states;
-        self.weigh(&mut outputs);
-        DVector::from_column_slice(outputs.as_slice())
-    }
-
-    fn weigh(&self, outputs: &mut DMatrix<f64>) {
+    /// Outputs (p x samples) in units of the deviations, one sample below the other.
+    fn weighed(&self, mut outputs: DMatrix<f64>) -> DVector<f64> {
         for (mut row, deviation) in outputs.row_iter_mut().zip(self.deviation.iter()) {
             row /= *deviation;
         }
+        DVector::from_column_slice(outputs.as_slice())
     }
 
-    /// What the readings of `window` leave unexplained, and, where `sloping`, how it falls with the parameters.
-    fn explain(&self, window: &Window, theta: &DVector<f64>, sloping: bool) -> Explained {
-        let (a, b) = self.matrices(theta);
-        let (n, m) = b.shape();
-        let samples = window.u.nrows();
-        let none = DVector::zeros(n);
-        let driven = Self::run(&a, none.clone(), &(&b * window.u.transpose()));
+    /// What each of the window's own unknowns does: states (n x samples), and outputs in units of the deviations.
+    fn own(&self, a: &DMatrix<f64>, window: &Window) -> Vec<(DMatrix<f64>, DVector<f64>)> {
+        let (n, samples) = (a.nrows(), window.u.nrows());
         let still = DMatrix::zeros(n, samples);
-        let mut own: Vec<(DMatrix<f64>, DMatrix<f64>)> = (0..n)
-            .map(|i| {
-                let mut start = none.clone();
-                start[i] = 1.0;
-                let states = Self::run(&a, start, &still);
-                let outputs = &self.mode.c * &states;
+        let starts = (0..n).map(|i| {
+            let start = DVector::from_fn(n, |row, _| f64::from(row == i));
+            let states = Self::run(a, start, &still);
+            let outputs = &self.mode.c * &states;
+            (states, outputs)
+        });
+        let channels = self.mode.e.column_iter().zip(self.mode.f.column_iter());
+        let waves = channels.flat_map(|(e, f)| {
+            window.waves.column_iter().map(move |wave| {
+                let states = Self::run(a, DVector::zeros(n), &(e * wave.transpose()));
+                let outputs = &self.mode.c * &states + f * wave.transpose();
                 (states, outputs)
             })
-            .collect();
-        for (e, f) in self.mode.e.column_iter().zip(self.mode.f.column_iter()) {
-            for wave in window.waves.column_iter() {
-                let states = Self::run(&a, none.clone(), &(e * wave.transpose()));
-                let outputs = &self.mode.c * &states + f * wave.transpose();
-                own.push((states, outputs));
-            }
-        }
-        let mut free = DMatrix::zeros(samples * self.mode.c.nrows(), own.len());
-        for (mut column, (_, outputs)) in free.column_iter_mut().zip(&mut own) {
-            self.weigh(outputs);
-            column.copy_from_slice(outputs.as_slice());
-        }
-        let mut read = window.y.transpose();
-        self.weigh(&mut read);
-        let read = DVector::from_column_slice(read.as_slice()) - self.seen(&driven);
+        });
+        let all = starts.chain(waves);
+        all.map(|(states, outputs)| (states, self.weighed(outputs)))
+            .collect()
+    }
+
+    /// What explains the readings of `window` best, and what it leaves.
+    fn explain(&self, window: &Window, theta: &DVector<f64>) -> Explained {
+        let (a, b) = self.matrices(theta);
+        let drive = &b * window.u.transpose();
+        let mut states = Self::run(&a, DVector::zeros(a.nrows()), &drive);
+        let read = self.weighed(window.y.transpose()) - self.weighed(&self.mode.c * &states);
+        let own = self.own(&a, window);
+        let columns: Vec<_> = own.iter().map(|(_, outputs)| outputs.clone()).collect();
+        let free = DMatrix::from_columns(&columns);
+        let lost = Explained {
+            rest: DVector::from_element(read.len(), f64::INFINITY),
+            span: DMatrix::zeros(read.len(), 0),
+            states: states.clone(),
+        };
         if !free.iter().all(|value| value.is_finite()) {
-            let rest = DVector::from_element(read.len(), f64::INFINITY);
-            return Explained {
-                rest,
-                slope: DMatrix::zeros(0, 0),
-            };
+            return lost;
         }
         // Directions that the window cannot tell apart are left at none.
         let svd = free.svd(true, true);
@@ -305,47 +306,46 @@ impl GreyBox<'_> {
         let kept = svd.singular_values.iter().filter(|&&value| value > least);
         let kept = kept.count();
         let (Some(u), Some(vt)) = (svd.u, svd.v_t) else {
-            return Explained {
-                rest: read,
-                slope: DMatrix::zeros(0, 0),
-            };
+            return lost;
         };
-        let span = u.columns(0, kept);
-        let found = span.transpose() * &read;
-        let rest = &read - span * &found;
-        if !sloping {
-            return Explained {
-                rest,
-                slope: DMatrix::zeros(0, 0),
-            };
-        }
+        let span = u.columns(0, kept).into_owned();
+        let found = span.tr_mul(&read);
+        let rest = &read - &span * &found;
         let coordinates = DVector::from_fn(kept, |k, _| found[k] / svd.singular_values[k]);
-        let amounts = vt.rows(0, kept).transpose() * coordinates;
-        let mut states = driven;
+        let amounts = vt.rows(0, kept).tr_mul(&coordinates);
         for ((of_own, _), amount) in own.iter().zip(amounts.iter()) {
             states += of_own * *amount;
         }
-        let mut slope = DMatrix::zeros(read.len(), theta.len());
+        Explained { rest, span, states }
+    }
+
+    /// How the rest of `window` falls with each parameter, without what the window's own unknowns can do
+    /// (samples p x parameters).
+    fn slope(&self, window: &Window, theta: &DVector<f64>, found: &Explained) -> DMatrix<f64> {
+        let (a, b) = self.matrices(theta);
+        let (n, m) = b.shape();
+        let samples = window.u.nrows();
+        let mut slope = DMatrix::zeros(found.rest.len(), theta.len());
         for i in 0..n {
             let mut filter = |column: usize, signal: DMatrix<f64>| {
                 let mut drive = DMatrix::zeros(n, samples);
                 drive.set_row(i, &signal.row(0));
-                slope.set_column(column, &self.seen(&Self::run(&a, none.clone(), &drive)));
+                let states = Self::run(&a, DVector::zeros(n), &drive);
+                slope.set_column(column, &self.weighed(&self.mode.c * states));
             };
             for j in 0..n {
-                filter(i * n + j, states.rows(j, 1).into_owned());
+                filter(i * n + j, found.states.rows(j, 1).into_owned());
             }
             for j in 0..m {
                 filter(n * n + i * m + j, window.u.columns(j, 1).transpose());
             }
         }
-        let slope = &slope - span * (span.transpose() * &slope);
-        Explained { rest, slope }
+        &slope - &found.span * found.span.tr_mul(&slope)
     }
 
     /// Sum of squares of what is left, in units of the deviations.
     fn rests(&self, windows: &[Window], theta: &DVector<f64>) -> f64 {
-        let rest = |window| self.explain(window, theta, false).rest.norm_squared();
+        let rest = |window| self.explain(window, theta).rest.norm_squared();
         windows.iter().map(rest).sum()
     }
 
@@ -365,9 +365,10 @@ impl GreyBox<'_> {
         let mut normal = DMatrix::zeros(count, count);
         let mut right = DVector::zeros(count);
         for window in windows {
-            let found = self.explain(window, theta, true);
-            normal += found.slope.transpose() * &found.slope;
-            right += found.slope.transpose() * &found.rest;
+            let found = self.explain(window, theta);
+            let slope = self.slope(window, theta, &found);
+            normal += slope.tr_mul(&slope);
+            right += slope.tr_mul(&found.rest);
         }
         let weight = self.prior.map(|size| (size * size).recip());
         right -= weight.component_mul(&(theta - model));
@@ -385,42 +386,44 @@ impl GreyBox<'_> {
         (before > 0.0).then(|| (after / before).min(1.0))
     }
 
+    /// Sum of squares of what is left of each output (p), output units.
+    fn squares(&self, windows: &[Window], theta: &DVector<f64>) -> DVector<f64> {
+        let p = self.mode.c.nrows();
+        let mut sums = DVector::zeros(p);
+        for window in windows {
+            let rest = self.explain(window, theta).rest;
+            let rest = DMatrix::from_column_slice(p, window.y.nrows(), rest.as_slice());
+            for (q, row) in rest.row_iter().enumerate() {
+                sums[q] += row.norm_squared() * self.deviation[q] * self.deviation[q];
+            }
+        }
+        sums
+    }
+
     /// Standard deviation of what is left of each sensor (p), output units.
     fn unexplained(&self, windows: &[Window], theta: &DVector<f64>) -> DVector<f64> {
-        let p = self.mode.c.nrows();
-        let mut sums = DVector::<f64>::zeros(p);
-        let mut free = 0.0;
-        for window in windows {
-            let rest = self.explain(window, theta, false).rest;
-            let rest = DMatrix::from_column_slice(p, window.y.nrows(), rest.as_slice());
-            for (sum, (row, deviation)) in sums
-                .iter_mut()
-                .zip(rest.row_iter().zip(self.deviation.iter()))
-            {
-                *sum += row.norm_squared() * deviation * deviation;
-            }
+        let p = self.mode.c.nrows() as f64;
+        let free = |window: &Window| {
             let own = self.mode.a.nrows() + window.waves.ncols() * self.mode.e.ncols();
-            free += window.y.nrows() as f64 - own as f64 / p as f64;
-        }
-        sums.map(|sum| (sum / free).sqrt().max(f64::MIN_POSITIVE.sqrt()))
+            window.y.nrows() as f64 - own as f64 / p
+        };
+        let free: f64 = windows.iter().map(free).sum();
+        let squares = self.squares(windows, theta);
+        squares.map(|sum| (sum / free).sqrt().max(f64::MIN_POSITIVE.sqrt()))
     }
 
     /// 100 (1 - |y - fitted| / |y - mean|) of each output over the windows.
     fn percent(&self, windows: &[Window], theta: &DVector<f64>) -> Vec<f64> {
-        let p = self.mode.c.nrows();
-        let mut sums = vec![[0.0; 2]; p];
-        for window in windows {
-            let rest = self.explain(window, theta, false).rest;
-            let rest = DMatrix::from_column_slice(p, window.y.nrows(), rest.as_slice());
-            for (q, [left, all]) in sums.iter_mut().enumerate() {
-                let read = window.y.column(q);
-                *left += (rest.row(q) * self.deviation[q]).norm_squared();
-                *all += read.add_scalar(-read.mean()).norm_squared();
-            }
-        }
-        let percent =
-            |[left, all]: [f64; 2]| 100.0 * (1.0 - (left / all.max(f64::MIN_POSITIVE)).sqrt());
-        sums.into_iter().map(percent).collect()
+        let moved = |q: usize, window: &Window| {
+            let read = window.y.column(q);
+            read.add_scalar(-read.mean()).norm_squared()
+        };
+        let squares = self.squares(windows, theta);
+        let outputs = squares.iter().enumerate().map(|(q, left)| {
+            let all: f64 = windows.iter().map(|window| moved(q, window)).sum();
+            100.0 * (1.0 - (left / all.max(f64::MIN_POSITIVE)).sqrt())
+        });
+        outputs.collect()
     }
 }
 

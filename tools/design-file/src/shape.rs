@@ -8,7 +8,7 @@ use std::ops::Range;
 use toml::de::{DeTable, DeValue};
 
 /// Keys that are one table.
-const TABLES: [&str; 9] = [
+pub(crate) const TABLES: [&str; 9] = [
     "plant",
     "signals",
     "disturbance",
