@@ -2,11 +2,17 @@
 
 use crate::{Interface, SignalInfo};
 use ftc_design::{ControllerDesign, Design, RecordError, Signal, Signals};
-use ftc_plant::{Scenario, SwitchedPlant, TruePlant};
+use ftc_plant::scenario::{ModeInterval, Waveform};
+use ftc_plant::{Dimensions, Scenario, SwitchedPlant, TruePlant};
+use minicbor::Decoder;
+use minicbor::data::Type;
 use serde::Deserialize;
 
-/// Name of the design in an FMU's `resources` folder: MessagePack, the record as a map of its fields.
-pub const DESIGN_FILE: &str = "design.msgpack";
+/// Name of the design in an FMU's `resources` folder: CBOR (RFC 8949), the record as a map of its fields.
+pub const DESIGN_FILE: &str = "design.cbor";
+
+/// In how many others a list or map of the record may stand: twice as many as one does.
+const MOST_NESTED: usize = 32;
 
 /// Why the bytes of [`DESIGN_FILE`] cannot be written, or hold no design.
 #[derive(Debug, thiserror::Error)]
@@ -15,10 +21,18 @@ pub enum DesignFileError {
     /// The writer fails.
     #[cfg(feature = "write")]
     #[error(transparent)]
-    Write(#[from] rmp_serde::encode::Error),
+    Write(#[from] minicbor_serde::error::EncodeError<core::convert::Infallible>),
+    /// Lists within lists, or of unknown length, as no design has them.
+    #[error(
+        "{DESIGN_FILE}: lists and maps are nested deeper than a design's, or do not say their length"
+    )]
+    Nesting,
     /// The bytes are no record of a design.
     #[error("{DESIGN_FILE}: {0}")]
-    Read(#[from] rmp_serde::decode::Error),
+    Read(#[from] minicbor_serde::error::DecodeError),
+    /// The bytes are no CBOR.
+    #[error("{DESIGN_FILE}: {0}")]
+    Cbor(#[from] minicbor::decode::Error),
     /// Sizes do not agree, or a value is out of its range.
     #[error("{DESIGN_FILE}: {0}")]
     Check(#[from] RecordError),
@@ -32,7 +46,7 @@ pub enum DesignFileError {
 pub fn write_design(design: &Design) -> Result<Vec<u8>, DesignFileError> {
     let mut running = design.clone();
     running.proof = None;
-    Ok(rmp_serde::to_vec_named(&running)?)
+    Ok(minicbor_serde::to_vec(&running)?)
 }
 
 /// [`Design`] without its proof, which is not there: to be able to read it, too, took a seventh of a binary.
@@ -48,8 +62,10 @@ struct Running {
     scenario: Scenario,
 }
 
-impl From<Running> for Design {
-    fn from(read: Running) -> Self {
+impl TryFrom<Running> for Design {
+    type Error = RecordError;
+
+    fn try_from(read: Running) -> Result<Self, RecordError> {
         let mut design = Self::new(
             &read.name,
             read.plant,
@@ -59,8 +75,88 @@ impl From<Running> for Design {
         );
         design.format = read.format;
         design.true_plant = read.true_plant;
-        design
+        Ok(design)
     }
+}
+
+/// What a controller needs of [`Running`]: of the experiment only how long it lasts and in which mode it begins.
+#[derive(Deserialize)]
+struct Controlling {
+    format: u32,
+    name: String,
+    signals: Signals,
+    plant: SwitchedPlant,
+    controller: ControllerDesign,
+    scenario: Course,
+}
+
+/// The course of a [`Scenario`].
+#[derive(Deserialize)]
+struct Course {
+    steps: u64,
+    schedule: Vec<ModeInterval>,
+}
+
+impl TryFrom<Controlling> for Design {
+    type Error = RecordError;
+
+    fn try_from(read: Controlling) -> Result<Self, RecordError> {
+        let Course { steps, schedule } = read.scenario;
+        let reference = vec![Waveform::ZERO; read.controller.feedback.tracked.len()];
+        let mut scenario = Scenario::new(steps, reference, Dimensions::check(&read.plant)?);
+        scenario.schedule = schedule;
+        let mut design = Self::new(
+            &read.name,
+            read.plant,
+            read.signals,
+            read.controller,
+            scenario,
+        );
+        design.format = read.format;
+        Ok(design)
+    }
+}
+
+/// Whether no list or map stands in more than [`MOST_NESTED`] others: the reader calls itself for each.
+///
+/// # Errors
+/// Bytes that are no CBOR, lists that are nested deeper or of unknown length.
+fn check_nesting(bytes: &[u8]) -> Result<(), DesignFileError> {
+    let mut decoder = Decoder::new(bytes);
+    // Of each list that is not at its end the values that are still to come.
+    let mut open = vec![1];
+    while let Some(left) = open.last_mut() {
+        if *left == 0 {
+            open.pop();
+            continue;
+        }
+        *left -= 1;
+        let values = match decoder.datatype()? {
+            Type::Array => decoder.array()?,
+            Type::Map => decoder.map()?.map(|entries| entries.saturating_mul(2)),
+            Type::ArrayIndef | Type::MapIndef => None,
+            _ => {
+                decoder.skip()?;
+                continue;
+            }
+        };
+        match values {
+            Some(values) if open.len() <= MOST_NESTED => open.push(values),
+            _ => return Err(DesignFileError::Nesting),
+        }
+    }
+    Ok(())
+}
+
+fn read<'a, R>(bytes: &'a [u8]) -> Result<Design, DesignFileError>
+where
+    R: Deserialize<'a> + TryInto<Design, Error = RecordError>,
+{
+    check_nesting(bytes)?;
+    let record: R = minicbor_serde::from_slice(bytes)?;
+    let design = record.try_into()?;
+    design.check()?;
+    Ok(design)
 }
 
 /// Reads the bytes of [`DESIGN_FILE`] and checks that all sizes agree.
@@ -68,10 +164,16 @@ impl From<Running> for Design {
 /// # Errors
 /// Bytes that hold no design, or one whose sizes do not agree.
 pub fn read_design(bytes: &[u8]) -> Result<Design, DesignFileError> {
-    let running: Running = rmp_serde::from_slice(bytes)?;
-    let design = Design::from(running);
-    design.check()?;
-    Ok(design)
+    read::<Running>(bytes)
+}
+
+/// The same without what only the simulated plant needs: it is as designed, and nothing happens to it but
+/// the switches.
+///
+/// # Errors
+/// As [`read_design`].
+pub fn read_controller(bytes: &[u8]) -> Result<Design, DesignFileError> {
+    read::<Controlling>(bytes)
 }
 
 /// The disturbances as described, or else by their number alone.

@@ -25,7 +25,7 @@ pub mod xml;
 
 #[cfg(feature = "write")]
 pub use design::write_design;
-pub use design::{DESIGN_FILE, DesignFileError, read_design};
+pub use design::{DESIGN_FILE, DesignFileError, read_controller, read_design};
 pub use guid::{CONTROLLER, PLANT, guid};
 pub use interface::{Interface, SignalInfo, controller, plant};
 pub use table::{Span, VariableTable};

@@ -8,20 +8,20 @@ import zipfile
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-import msgpack
+import cbor2
 import numpy as np
 
 if TYPE_CHECKING:
     from pathlib import Path
 
-RESOURCE = "resources/design.msgpack"
+RESOURCE = "resources/design.cbor"
 CERTIFICATE = "resources/certificate.json"
 
 
 def load(fmu: Path) -> dict:
     """Returns the record zipped into an FMU, with what proves it."""
     with zipfile.ZipFile(fmu) as archive:
-        design = _with_matrices(msgpack.unpackb(archive.read(RESOURCE)))
+        design = _with_matrices(cbor2.loads(archive.read(RESOURCE)))
         return design | {"proof": json.loads(archive.read(CERTIFICATE))["proof"]}
 
 

@@ -147,7 +147,7 @@ fn texts(folder: &Path) -> Vec<PathBuf> {
 fn document(root: &Path, packages: &[Package]) -> String {
     let mut out = format!(
         "This FMU contains a generic binary of ftc-fmu {}, licensed under either of MIT or\n\
-         Apache-2.0 at your option, and a design (resources/design.msgpack), which belongs to whoever\n\
+         Apache-2.0 at your option, and a design (resources/design.cbor), which belongs to whoever\n\
          made it.\n\n\
          The binary links the Rust standard library (rust-standard-library.html beside this file)\n\
          and these crates statically; their licence texts and notices follow.\n\n",

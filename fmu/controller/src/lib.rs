@@ -1,6 +1,6 @@
 //! The controller FMU: a [`Slave`] over [`ftc_control`].
 //!
-//! The binary is generic; `resources/design.msgpack` makes it the controller of one plant. It works
+//! The binary is generic; `resources/design.cbor` makes it the controller of one plant. It works
 //! when a tick begins: it samples the measurements and publishes the command at once, so a master
 //! that steps the controller before the plant adds no delay to the loop.
 
@@ -142,7 +142,8 @@ impl Slave for ControllerFmu {
 
     fn load(resources: &Path, guid: &str) -> Result<Self, Refusal> {
         let bytes = resource::read_verified(resources, DESIGN_FILE, CONTROLLER, guid)?;
-        let design = model_description::read_design(&bytes).map_err(|error| error.to_string())?;
+        let design =
+            model_description::read_controller(&bytes).map_err(|error| error.to_string())?;
         let table = model_description::controller(&Interface::from(&design));
         let modes = 0..design.plant.modes.len();
         let first_mode = design.scenario.mode(0, design.plant.sample_time);

@@ -44,7 +44,7 @@ const DESCRIPTION: &str = "modelDescription.xml";
 
 const KNOWN: [&str; 4] = [
     DESCRIPTION,
-    "resources/design.msgpack",
+    "resources/design.cbor",
     "binaries/linux64/f_controller.so",
     "documentation/index.html",
 ];

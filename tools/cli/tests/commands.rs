@@ -423,10 +423,10 @@ fn an_fmu_holds_every_platform_that_is_there_and_belongs_to_its_design() {
                 "model.png",
                 "modelDescription.xml",
                 "resources/certificate.json",
-                "resources/design.msgpack",
+                "resources/design.cbor",
             ]
         );
-        let design = &files["resources/design.msgpack"];
+        let design = &files["resources/design.cbor"];
         let xml = String::from_utf8(files["modelDescription.xml"].clone()).unwrap();
         assert!(
             xml.contains(&model_description::guid(binary, design)),

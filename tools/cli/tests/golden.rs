@@ -1,4 +1,4 @@
-//! Every example, to the bit: the bytes of its exported `design.msgpack` and of its `trajectories.csv`
+//! Every example, to the bit: the bytes of its exported `design.cbor` and of its `trajectories.csv`
 //! (each number written so that it reads back to the same bits) against the hashes in
 //! `golden/hashes.json`.
 //!
@@ -92,7 +92,7 @@ fn example(path: &Path) -> Example {
     let simulated = run("simulate");
     let read = |name: &str| fs::read(simulated.join(name)).unwrap();
     Example {
-        design: hash(&unzip(&controller)["resources/design.msgpack"]),
+        design: hash(&unzip(&controller)["resources/design.cbor"]),
         trajectories: hash(&read("trajectories.csv")),
         metrics: serde_json::from_slice(&read("metrics.json")).unwrap(),
     }
@@ -145,7 +145,7 @@ fn examples_give_the_same_bits() {
             assert_eq!(
                 (&found.design, &found.trajectories),
                 (&wanted.design, &wanted.trajectories),
-                "{name}: other bits in design.msgpack or in trajectories.csv"
+                "{name}: other bits in design.cbor or in trajectories.csv"
             );
         } else {
             assert!(

@@ -14,7 +14,7 @@ use std::io::{Cursor, Write};
 use std::sync::OnceLock;
 use zip::write::SimpleFileOptions;
 
-const DESIGN: &str = "resources/design.msgpack";
+const DESIGN: &str = "resources/design.cbor";
 const CERTIFICATE: &str = "resources/certificate.json";
 const DESCRIPTION: &str = "modelDescription.xml";
 

@@ -67,7 +67,7 @@ const STANDARD_LIBRARY: &str =
 const ICON: &[u8] = include_bytes!("../assets/model.png");
 
 /// Where the design stands in an FMU.
-pub(crate) const RESOURCE: &str = "resources/design.msgpack";
+pub(crate) const RESOURCE: &str = "resources/design.cbor";
 
 /// What an export needs of the design and of the machine.
 struct Exporter<'a> {

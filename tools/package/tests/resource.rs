@@ -6,7 +6,8 @@
 mod common;
 
 use common::design;
-use model_description::{read_design, write_design};
+use ftc_design::Design;
+use model_description::{Interface, read_controller, read_design, write_design};
 use serde_json::Value;
 
 /// Bytes for names of fields, units and sizes of lists.
@@ -39,6 +40,12 @@ fn every_example_is_read_back_from_little_more_than_its_numbers() {
         let bytes = write_design(&design).unwrap();
         design.proof = None;
         assert_eq!(read_design(&bytes).unwrap(), design, "{example}");
+        let controlling = read_controller(&bytes).unwrap();
+        assert_eq!(controlling.parameters(), design.parameters(), "{example}");
+        let table = |design| model_description::controller(&Interface::from(design));
+        assert_eq!(table(&controlling), table(&design), "{example}");
+        let first = |design: &Design| design.scenario.mode(0, design.plant.sample_time);
+        assert_eq!(first(&controlling), first(&design), "{example}");
         let most = NAMES + NUMBER * numbers(&serde_json::to_value(&design).unwrap());
         assert!(
             bytes.len() <= most,

@@ -68,36 +68,51 @@ fn designs_of_another_layout_or_of_other_sizes_are_refused() {
         change(&mut altered);
         write_design(&altered).unwrap()
     };
-    // The last four: an empty map, nested lists, bytes and a map that announce more than there is.
+    // The last five: an empty map, nested lists, bytes and a map that announce more than there is, a list
+    // that does not say its length.
     let alterations = [
         altered(&|design| design.format = 0),
         altered(&|design| design.controller.feedback.tracked = vec![0, 7]),
-        altered(&|design| design.scenario.noise.truncate(1)),
         altered(&|design| design.controller.estimator.response_length = 1_000_000_000_000_000),
         altered(&|design| design.controller.estimator.window = 1_000_000_000_000_000),
         bytes[..bytes.len() / 2].to_vec(),
-        vec![0x80],
-        vec![0x91; 1_000_000],
-        vec![0xC6, 0xFF, 0xFF, 0xFF, 0xFF],
-        vec![0xDF, 0xFF, 0xFF, 0xFF, 0xFF],
+        vec![0xA0],
+        vec![0x81; 1_000_000],
+        vec![0x5A, 0xFF, 0xFF, 0xFF, 0xFF],
+        vec![0xBA, 0xFF, 0xFF, 0xFF, 0xFF],
+        vec![0x9F; 1_000_000],
     ];
     for altered in alterations {
         assert!(altered != bytes);
-        let binaries = ["ftc_controller", "ftc_plant"];
-        for (which, binary) in binaries.into_iter().enumerate() {
-            let folder = tempfile::tempdir().unwrap();
-            fs::write(folder.path().join(DESIGN_FILE), &altered).unwrap();
-            let guid = model_description::guid(binary, &altered);
-            let location = location(folder.path());
-            let made = Instance::made(
-                pair.functions()[which],
-                &pair.models[which],
-                &guid,
-                &location,
-            );
-            assert!(sentence(made).contains("design"));
+        for which in [0, 1] {
+            assert!(sentence(forged(&pair, which, &altered)).contains("design"));
         }
     }
+}
+
+/// What binary 0 or 1 makes of a design that fits its guid.
+fn forged(pair: &Pair, which: usize, design: &[u8]) -> Result<Instance, NotInstantiated> {
+    let folder = tempfile::tempdir().unwrap();
+    fs::write(folder.path().join(DESIGN_FILE), design).unwrap();
+    let guid = model_description::guid(["ftc_controller", "ftc_plant"][which], design);
+    let location = location(folder.path());
+    Instance::made(
+        pair.functions()[which],
+        &pair.models[which],
+        &guid,
+        &location,
+    )
+}
+
+/// What happens to the plant is read by the plant alone.
+#[test]
+fn an_experiment_of_other_sizes_is_refused_by_the_plant() {
+    let pair = Pair::load();
+    let mut design = read_design(&design(&pair.models[0])).unwrap();
+    design.scenario.noise.truncate(1);
+    let bytes = write_design(&design).unwrap();
+    assert!(forged(&pair, 0, &bytes).is_ok());
+    assert!(sentence(forged(&pair, 1, &bytes)).contains("noise levels"));
 }
 
 /// A zip made by hand: the XML of one FMU, the binary of the other, one design.
