@@ -5,6 +5,7 @@ promise: all-sizes
 
 from __future__ import annotations
 
+import zipfile
 from typing import TYPE_CHECKING
 
 import pytest
@@ -26,6 +27,21 @@ def test_every_dimension_varies() -> None:
         counts = (one.states, one.inputs, one.outputs, one.modes)
         assert len(set(counts)) == len(counts)
         assert len(sizes.design(one)["mode"]) == one.modes
+
+
+def test_an_fmu_is_small(make_case: Callable[[dict], Case]) -> None:
+    """An FMU for one platform of a plant of four states, licence texts and documentation included.
+
+    promise: small-fmu
+    """
+    (four,) = (one for one in sizes.ALL if one.states == 4)
+    fmus = make_case(sizes.design(four)).fmus
+    for fmu in (fmus.controller, fmus.plant):
+        with zipfile.ZipFile(fmu) as archive:
+            binaries = [name for name in archive.namelist() if name.startswith("binaries/linux64/")]
+            others = sum(e.compress_size for e in archive.infolist() if e.filename.startswith("binaries/"))
+            one = sum(archive.getinfo(name).compress_size for name in binaries)
+        assert fmu.stat().st_size - others + one < 700_000, fmu
 
 
 @pytest.mark.parametrize("of", sizes.ALL, ids=str)
