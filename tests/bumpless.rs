@@ -8,8 +8,8 @@ use ftc_control::parameters::{Compensation, EstimatorMethod};
 use ftc_control::{Compensate, Controller};
 use ftc_design::assembly::{DatabaseSource, EstimatorSpec, Request, assemble};
 use ftc_design::{ControlSpec, Design, Lyapunov, Objective, ObserverChoice, ObserverSpec, Signals};
-use ftc_plant::scenario::{ModeInterval, Waveform};
-use ftc_plant::{Mode, OperatingPoint, Scenario, SwitchedPlant, TruePlant};
+use ftc_plant::scenario::Waveform;
+use ftc_plant::{Mode, Scenario, SwitchedPlant, TruePlant};
 use nalgebra::{DMatrix, DVector};
 
 fn single(value: f64) -> DMatrix<f64> {
@@ -18,19 +18,12 @@ fn single(value: f64) -> DMatrix<f64> {
 
 /// Two unstable modes of first order.
 fn plant() -> SwitchedPlant {
-    let mode = |a: f64| Mode {
-        name: format!("{a}"),
-        a: single(a),
-        b: single(1.0),
-        c: single(1.0),
-        e: single(1.0),
-        f: single(0.0),
-        operating_point: OperatingPoint::zero(1, 1, 1),
+    let mode = |a: f64| {
+        Mode::new(single(a), single(1.0), single(1.0))
+            .named(format!("{a}"))
+            .with_disturbance(single(1.0), single(0.0))
     };
-    SwitchedPlant {
-        sample_time: 1.0,
-        modes: vec![mode(1.2), mode(1.25)],
-    }
+    SwitchedPlant::new(1.0, vec![mode(1.2), mode(1.25)])
 }
 
 fn request(lyapunov: Lyapunov, bumpless: bool) -> Request {
@@ -64,16 +57,7 @@ fn request(lyapunov: Lyapunov, bumpless: bool) -> Request {
             ..EstimatorSpec::default()
         },
         compensation: Compensation::None,
-        scenario: Scenario {
-            steps: 200,
-            noise: vec![0.0],
-            seed: 1,
-            schedule: vec![ModeInterval { from: 0.0, mode: 0 }],
-            reference: vec![Waveform::ZERO],
-            fault: vec![Waveform::ZERO],
-            events: Vec::new(),
-            disturbance: vec![Waveform::ZERO],
-        },
+        scenario: Scenario::new(200, vec![Waveform::ZERO], plant().dimensions()),
     }
 }
 

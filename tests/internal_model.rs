@@ -13,7 +13,7 @@ use ftc_design::{
 };
 use ftc_plant::scaling::Scaling;
 use ftc_plant::scenario::{ModeInterval, Waveform};
-use ftc_plant::{Mode, OperatingPoint, SwitchedPlant};
+use ftc_plant::{Mode, SwitchedPlant};
 use ftc_simulate::{PlantSimulator, Variant, run};
 use nalgebra::{DMatrix, dmatrix};
 
@@ -210,18 +210,17 @@ fn advice_about_a_decay_too_fast_for_two_harmonics_is_good_advice() {
 #[test]
 fn a_harmonic_the_inputs_cannot_reach_is_named() {
     let scalar = |value| DMatrix::from_element(1, 1, value);
-    let blind = SwitchedPlant {
-        sample_time: 1.0,
-        modes: vec![Mode {
-            name: String::new(),
-            a: dmatrix![0.0, 1.0, 0.0; 0.0, 0.0, 1.0; 0.1, -0.2, 0.3],
-            b: dmatrix![0.0; 0.0; 1.0],
-            c: dmatrix![1.0, -2.0 * ANGLE.cos(), 1.0],
-            e: dmatrix![1.0; 0.0; 0.0],
-            f: scalar(0.0),
-            operating_point: OperatingPoint::zero(3, 1, 1),
-        }],
-    };
+    let blind = SwitchedPlant::new(
+        1.0,
+        vec![
+            Mode::new(
+                dmatrix![0.0, 1.0, 0.0; 0.0, 0.0, 1.0; 0.1, -0.2, 0.3],
+                dmatrix![0.0; 0.0; 1.0],
+                dmatrix![1.0, -2.0 * ANGLE.cos(), 1.0],
+            )
+            .with_disturbance(dmatrix![1.0; 0.0; 0.0], scalar(0.0)),
+        ],
+    );
     let control = ControlSpec {
         resonators: vec![1.0, ANGLE],
         ..ControlSpec::unweighted(blind.dimensions())

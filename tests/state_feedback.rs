@@ -10,7 +10,7 @@ use ftc_design::{
     ControlSpec, DesignError, Lyapunov, Objective, Run, Solver, StateFeedback, Step, Units,
 };
 use ftc_plant::scaling::Scaling;
-use ftc_plant::{Mode, OperatingPoint, SwitchedPlant, spectral_radius};
+use ftc_plant::{Mode, SwitchedPlant, spectral_radius};
 use nalgebra::{Complex, DMatrix};
 use plants::{
     Channel, half_unstable, in_units, paper, paper_spec, random_plant, rectifier,
@@ -473,19 +473,13 @@ fn the_optimum_of_a_single_large_mode_is_known_at_once() {
         };
         let n = 10 + seed;
         let raw = random(1, n, n);
-        let mode = Mode {
-            name: String::new(),
-            a: &raw * (0.9 / raw.clone().singular_values().max()),
-            b: random(2, n, n / 2),
-            c: random(3, n / 2, n),
-            e: random(4, n, 1),
-            f: DMatrix::zeros(n / 2, 1),
-            operating_point: OperatingPoint::zero(n, n / 2, n / 2),
-        };
-        let plant = SwitchedPlant {
-            sample_time: 1.0,
-            modes: vec![mode],
-        };
+        let mode = Mode::new(
+            &raw * (0.9 / raw.clone().singular_values().max()),
+            random(2, n, n / 2),
+            random(3, n / 2, n),
+        )
+        .with_disturbance(random(4, n, 1), DMatrix::zeros(n / 2, 1));
+        let plant = SwitchedPlant::new(1.0, vec![mode]);
         let spec = usual(&plant, Lyapunov::Common, 0.97);
         let asked = AtomicUsize::new(0);
         let watch = |step: Step| {

@@ -7,7 +7,7 @@ use ftc_design::{
     ControlSpec, DesignError, Lyapunov, ObserverChoice, ObserverSpec, SolverFailure, synthesise,
 };
 use ftc_plant::scaling::Scaling;
-use ftc_plant::{Mode, OperatingPoint, SwitchedPlant, spectral_radius};
+use ftc_plant::{Mode, SwitchedPlant, spectral_radius};
 use nalgebra::DMatrix;
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::{Rng, SeedableRng};
@@ -28,19 +28,16 @@ fn plant(dice: &mut ChaCha8Rng, n: usize, modes: usize) -> SwitchedPlant {
     let a = matrix(dice, n, n);
     let a = &a * (0.8 / spectral_radius(&a));
     let (b, c, e) = (matrix(dice, n, m), matrix(dice, p, n), matrix(dice, n, 1));
-    let mode = |dice: &mut ChaCha8Rng| Mode {
-        name: "random".into(),
-        a: &a + 0.02 * matrix(dice, n, n),
-        b: &b + 0.02 * matrix(dice, n, m),
-        c: c.clone(),
-        e: e.clone(),
-        f: DMatrix::zeros(p, 1),
-        operating_point: OperatingPoint::zero(n, m, p),
+    let mode = |dice: &mut ChaCha8Rng| {
+        Mode::new(
+            &a + 0.02 * matrix(dice, n, n),
+            &b + 0.02 * matrix(dice, n, m),
+            c.clone(),
+        )
+        .named("random")
+        .with_disturbance(e.clone(), DMatrix::zeros(p, 1))
     };
-    SwitchedPlant {
-        sample_time: 1.0,
-        modes: (0..modes).map(|_| mode(dice)).collect(),
-    }
+    SwitchedPlant::new(1.0, (0..modes).map(|_| mode(dice)).collect())
 }
 
 /// Seconds of one design, and what came of it.

@@ -12,7 +12,7 @@ use ftc_design::{
 };
 use ftc_plant::Scenario;
 use ftc_plant::scenario::{ModeInterval, Waveform};
-use ftc_plant::{Mode, OperatingPoint, SwitchedPlant};
+use ftc_plant::{Dimensions, Mode, SwitchedPlant};
 use nalgebra::{DMatrix, dmatrix};
 
 /// Where the disturbance enters.
@@ -27,18 +27,14 @@ pub fn plant(channel: Channel) -> SwitchedPlant {
         Channel::State => (dmatrix![1.0; 1.0], dmatrix![0.0; 0.0]),
         Channel::Output => (dmatrix![0.0; 0.0], dmatrix![1.0; 1.0]),
     };
-    let mode = |name: &str, a: DMatrix<f64>, b: DMatrix<f64>| Mode {
-        name: name.into(),
-        a,
-        b,
-        c: DMatrix::identity(2, 2),
-        e: e.clone(),
-        f: f.clone(),
-        operating_point: OperatingPoint::zero(2, 2, 2),
+    let mode = |name: &str, a: DMatrix<f64>, b: DMatrix<f64>| {
+        Mode::new(a, b, DMatrix::identity(2, 2))
+            .named(name)
+            .with_disturbance(e.clone(), f.clone())
     };
-    SwitchedPlant {
-        sample_time: 1.0,
-        modes: vec![
+    SwitchedPlant::new(
+        1.0,
+        vec![
             mode(
                 "first",
                 dmatrix![0.6, 0.45; -0.2, 0.3],
@@ -50,7 +46,7 @@ pub fn plant(channel: Channel) -> SwitchedPlant {
                 DMatrix::identity(2, 2),
             ),
         ],
-    }
+    )
 }
 
 pub const REFERENCES: [&str; 4] = ["constant", "square", "sine", "levels"];
@@ -79,30 +75,36 @@ pub fn scenario(reference: Waveform, noise: f64, disturbances: usize) -> Scenari
     let fault = Waveform::Steps {
         points: vec![[101.0, 0.5], [401.0, 0.0], [1001.0, 0.5]],
     };
-    Scenario {
-        steps: 1600,
-        noise: vec![noise; 2],
-        seed: 42,
-        schedule: vec![
-            ModeInterval { from: 0.0, mode: 0 },
-            ModeInterval {
-                from: 800.0,
-                mode: 1,
-            },
-        ],
-        reference: vec![reference; 2],
-        fault: vec![fault; 2],
-        events: vec![],
-        disturbance: vec![
-            Waveform::Sine {
-                amplitude: 0.04,
-                period: core::f64::consts::TAU / 0.02,
-                phase: 0.0,
-                offset: 0.0
-            };
-            disturbances
-        ],
-    }
+    let mut scenario = Scenario::new(
+        1600,
+        vec![reference; 2],
+        Dimensions {
+            states: 2,
+            inputs: 2,
+            outputs: 2,
+            disturbances,
+        },
+    );
+    scenario.noise = vec![noise; 2];
+    scenario.seed = 42;
+    scenario.schedule = vec![
+        ModeInterval { from: 0.0, mode: 0 },
+        ModeInterval {
+            from: 800.0,
+            mode: 1,
+        },
+    ];
+    scenario.fault = vec![fault; 2];
+    scenario.disturbance = vec![
+        Waveform::Sine {
+            amplitude: 0.04,
+            period: core::f64::consts::TAU / 0.02,
+            phase: 0.0,
+            offset: 0.0
+        };
+        disturbances
+    ];
+    scenario
 }
 
 /// Gains from a linear-quadratic design, rounded by hand; an observer whose error shrinks by 80 % a sample.

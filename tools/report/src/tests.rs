@@ -10,7 +10,7 @@ use ftc_control::parameters::{
 use ftc_control::{Controller, Matrix};
 use ftc_design::{ControllerDesign, Design, Signal, Signals};
 use ftc_plant::scenario::{FaultEvent, FaultKind, ModeInterval, Waveform};
-use ftc_plant::{Mode, OperatingPoint, Scenario, SwitchedPlant};
+use ftc_plant::{Mode, Scenario, SwitchedPlant};
 use ftc_simulate::{PlantSimulator, Variant, run};
 use nalgebra::DMatrix;
 use proptest::prelude::*;
@@ -44,14 +44,11 @@ fn paper(noise: f64) -> Design {
 fn lags(outputs: usize, disturbances: usize, steps: u64) -> Design {
     let square = DMatrix::identity(outputs, outputs);
     let diagonal = |value: f64| Matrix::identity(outputs).scaled(value);
-    let mode = |pole: f64| Mode {
-        name: String::new(),
-        a: &square * pole,
-        b: &square * (1.0 - pole),
-        c: square.clone(),
-        e: DMatrix::from_element(outputs, disturbances, 0.1),
-        f: DMatrix::zeros(outputs, disturbances),
-        operating_point: OperatingPoint::zero(outputs, outputs, outputs),
+    let mode = |pole: f64| {
+        Mode::new(&square * pole, &square * (1.0 - pole), square.clone()).with_disturbance(
+            DMatrix::from_element(outputs, disturbances, 0.1),
+            DMatrix::zeros(outputs, disturbances),
+        )
     };
     let gains = FeedbackGains {
         state_feedback: diagonal(-0.1),
@@ -61,10 +58,7 @@ fn lags(outputs: usize, disturbances: usize, steps: u64) -> Design {
         anti_windup: diagonal(0.0),
         output_feedback: diagonal(-0.1),
     };
-    let plant = SwitchedPlant {
-        sample_time: 0.01,
-        modes: vec![mode(0.5), mode(0.7)],
-    };
+    let plant = SwitchedPlant::new(0.01, vec![mode(0.5), mode(0.7)]);
     let at = |time: f64| time * steps as f64 * 0.01;
     let signals = Signals {
         inputs: signals(outputs, "u", Some("V")),
@@ -105,18 +99,9 @@ fn lags(outputs: usize, disturbances: usize, steps: u64) -> Design {
         },
         compensation: Compensation::None,
     };
-    let scenario = Scenario {
+    let mut scenario = Scenario::new(
         steps,
-        noise: vec![0.02; outputs],
-        seed: 7,
-        schedule: vec![
-            ModeInterval { from: 0.0, mode: 0 },
-            ModeInterval {
-                from: at(0.5),
-                mode: 1,
-            },
-        ],
-        reference: vec![
+        vec![
             Waveform::Square {
                 amplitude: 1.0,
                 period: at(0.4),
@@ -124,23 +109,32 @@ fn lags(outputs: usize, disturbances: usize, steps: u64) -> Design {
             };
             outputs
         ],
-        fault: vec![Waveform::ZERO; outputs],
-        events: vec![FaultEvent {
-            sensor: outputs - 1,
-            from: at(0.6),
-            until: at(0.8),
-            kind: FaultKind::Dropout,
-        }],
-        disturbance: vec![
-            Waveform::Sine {
-                amplitude: 1.0,
-                period: at(0.2),
-                phase: 0.0,
-                offset: 0.0
-            };
-            disturbances
-        ],
-    };
+        plant.dimensions(),
+    );
+    scenario.noise = vec![0.02; outputs];
+    scenario.seed = 7;
+    scenario.schedule = vec![
+        ModeInterval { from: 0.0, mode: 0 },
+        ModeInterval {
+            from: at(0.5),
+            mode: 1,
+        },
+    ];
+    scenario.events = vec![FaultEvent {
+        sensor: outputs - 1,
+        from: at(0.6),
+        until: at(0.8),
+        kind: FaultKind::Dropout,
+    }];
+    scenario.disturbance = vec![
+        Waveform::Sine {
+            amplitude: 1.0,
+            period: at(0.2),
+            phase: 0.0,
+            offset: 0.0
+        };
+        disturbances
+    ];
     Design::new("lags", plant, signals, controller, scenario)
 }
 

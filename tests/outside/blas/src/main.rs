@@ -185,19 +185,8 @@ pub unsafe extern "C" fn dgesvd_(
 }
 
 fn main() {
-    let mode = |pole: f64| Mode {
-        name: "mode".into(),
-        a: dmatrix![pole, 0.1; 0.0, 0.5],
-        b: dmatrix![0.0; 1.0],
-        c: dmatrix![1.0, 0.0],
-        e: dmatrix![0.1; 0.0],
-        f: dmatrix![0.0],
-        operating_point: OperatingPoint::zero(2, 1, 1),
-    };
-    let plant = SwitchedPlant {
-        sample_time: 1.0,
-        modes: vec![mode(0.9), mode(0.8)],
-    };
+    let mode = |pole: f64| Mode::new(dmatrix![pole, 0.1; 0.0, 0.5], dmatrix![0.0; 1.0], dmatrix![1.0, 0.0]).named("mode").with_disturbance(dmatrix![0.1; 0.0], dmatrix![0.0]);
+    let plant = SwitchedPlant::new(1.0, vec![mode(0.9), mode(0.8)]);
     let spec = ControlSpec {
         decay: 0.98,
         ..ControlSpec::unweighted(plant.dimensions())
