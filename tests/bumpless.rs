@@ -6,10 +6,10 @@
 
 use ftc_control::parameters::{Compensation, EstimatorMethod};
 use ftc_control::{Compensate, Controller};
-use ftc_design::assembly::{DatabaseSource, EstimatorSpec, Request, assemble};
-use ftc_design::{ControlSpec, Design, Lyapunov, Objective, ObserverChoice, ObserverSpec, Signals};
+use ftc_design::assembly::{DatabaseSource, Request, assemble};
+use ftc_design::{ControlSpec, Design, Lyapunov, ObserverChoice, ObserverSpec, Signals};
 use ftc_plant::scenario::Waveform;
-use ftc_plant::{Mode, Scenario, SwitchedPlant, TruePlant};
+use ftc_plant::{Mode, Scenario, SwitchedPlant};
 use nalgebra::{DMatrix, DVector};
 
 fn single(value: f64) -> DMatrix<f64> {
@@ -27,38 +27,24 @@ fn plant() -> SwitchedPlant {
 }
 
 fn request(lyapunov: Lyapunov, bumpless: bool) -> Request {
-    Request {
-        name: "bump".into(),
-        signals: Signals::numbered(plant().dimensions()),
-        plant: plant(),
-        true_plant: TruePlant::AsDesigned,
-        control: ControlSpec {
-            tracked: vec![0],
-            latency: 0,
-            lyapunov,
-            decay: 0.9,
-            objective: Objective::Attenuation,
-            resonators: Vec::new(),
-            output_weight: vec![1.0],
-            integral_weight: vec![0.3],
-            input_weight: vec![0.1],
-        },
-        bumpless,
-        feedforward: false,
-        observer: ObserverSpec {
-            kind: ObserverChoice::Luenberger,
-            decay: 0.6,
-            lyapunov,
-            noise: Vec::new(),
-        },
-        estimator: EstimatorSpec {
-            method: EstimatorMethod::None,
-            database: DatabaseSource::Model,
-            ..EstimatorSpec::default()
-        },
-        compensation: Compensation::None,
-        scenario: Scenario::new(200, vec![Waveform::ZERO], plant().dimensions()),
-    }
+    let mut request = Request::new(
+        "bump",
+        plant(),
+        Signals::numbered(plant().dimensions()),
+        Scenario::new(200, vec![Waveform::ZERO], plant().dimensions()),
+    );
+    request.control = ControlSpec::unweighted(plant().dimensions());
+    request.control.lyapunov = lyapunov;
+    request.control.decay = 0.9;
+    request.control.integral_weight = vec![0.3];
+    request.control.input_weight = vec![0.1];
+    request.bumpless = bumpless;
+    request.feedforward = false;
+    request.observer = ObserverSpec::new(ObserverChoice::Luenberger, 0.6, lyapunov);
+    request.estimator.method = EstimatorMethod::None;
+    request.estimator.database = DatabaseSource::Model;
+    request.compensation = Compensation::None;
+    request
 }
 
 /// The largest output and the largest jumps of the command at switches that may and may not be smooth,

@@ -13,12 +13,7 @@ use nalgebra::DMatrix;
 use plants::{Channel, mode, paper, random_plant, rows};
 
 fn spec(kind: ObserverChoice, decay: f64, lyapunov: Lyapunov) -> ObserverSpec {
-    ObserverSpec {
-        kind,
-        decay,
-        lyapunov,
-        noise: Vec::new(),
-    }
+    ObserverSpec::new(kind, decay, lyapunov)
 }
 
 fn design(plant: &SwitchedPlant, spec: &ObserverSpec) -> Result<ObserverDesign, DesignError> {

@@ -44,21 +44,14 @@ fn plant(dice: &mut ChaCha8Rng, n: usize, modes: usize) -> SwitchedPlant {
 fn timed(plant: &SwitchedPlant, lyapunov: Lyapunov) -> (f64, &'static str) {
     let dims = plant.dimensions();
     let tracked = 1;
-    let control = ControlSpec {
-        tracked: (0..tracked).collect(),
-        lyapunov,
-        decay: 0.97,
-        output_weight: vec![1.0; tracked],
-        integral_weight: vec![0.3; tracked],
-        input_weight: vec![0.3; dims.inputs],
-        ..ControlSpec::unweighted(dims)
-    };
-    let observer = ObserverSpec {
-        kind: ObserverChoice::Auto,
-        decay: 0.97,
-        lyapunov,
-        noise: Vec::new(),
-    };
+    let mut control = ControlSpec::unweighted(dims);
+    control.tracked = (0..tracked).collect();
+    control.lyapunov = lyapunov;
+    control.decay = 0.97;
+    control.output_weight = vec![1.0; tracked];
+    control.integral_weight = vec![0.3; tracked];
+    control.input_weight = vec![0.3; dims.inputs];
+    let observer = ObserverSpec::new(ObserverChoice::Auto, 0.97, lyapunov);
     let begin = Instant::now();
     let scaling = Scaling::automatic(plant);
     let outcome = match synthesise(plant, &control, &observer, &scaling) {

@@ -56,15 +56,14 @@ pub fn paper(channel: Channel) -> SwitchedPlant {
 /// The weights of the reference table: 1 on the output, 0.3 on the integral, 0.1 on the input.
 pub fn paper_spec(latency: usize, decay: f64, lyapunov: Lyapunov) -> ControlSpec {
     let dims = paper(Channel::State).dimensions();
-    ControlSpec {
-        latency,
-        decay,
-        lyapunov,
-        output_weight: vec![1.0; 2],
-        integral_weight: vec![0.3; 2],
-        input_weight: vec![0.1; 2],
-        ..ControlSpec::unweighted(dims)
-    }
+    let mut spec = ControlSpec::unweighted(dims);
+    spec.latency = latency;
+    spec.decay = decay;
+    spec.lyapunov = lyapunov;
+    spec.output_weight = vec![1.0; 2];
+    spec.integral_weight = vec![0.3; 2];
+    spec.input_weight = vec![0.1; 2];
+    spec
 }
 
 /// A linear congruential generator: reproducible anywhere, good enough for matrices.
@@ -364,25 +363,22 @@ pub fn in_units(
         weights.iter().zip(units).map(|(w, u)| w * u).collect()
     };
     let tracked = || spec.tracked.iter().map(|&output| units.outputs[output]);
-    let changed = ControlSpec {
-        output_weight: over(&spec.output_weight, &mut tracked()),
-        integral_weight: over(&spec.integral_weight, &mut tracked()),
-        input_weight: over(&spec.input_weight, &mut units.inputs.iter().copied()),
-        ..spec.clone()
-    };
+    let mut changed = spec.clone();
+    changed.output_weight = over(&spec.output_weight, &mut tracked());
+    changed.integral_weight = over(&spec.integral_weight, &mut tracked());
+    changed.input_weight = over(&spec.input_weight, &mut units.inputs.iter().copied());
     (units.apply(plant), changed)
 }
 
 /// Each guarantee in turn, with the usual weights.
 pub fn usual_spec(seed: u64, dims: Dimensions) -> ControlSpec {
     let r = dims.outputs.min(dims.inputs);
-    ControlSpec {
-        decay: 0.95,
-        lyapunov: [Lyapunov::Common, Lyapunov::Switched, Lyapunov::Dwell][seed as usize % 3],
-        integral_weight: vec![0.3; r],
-        input_weight: vec![0.1; dims.inputs],
-        ..ControlSpec::unweighted(dims)
-    }
+    let mut spec = ControlSpec::unweighted(dims);
+    spec.decay = 0.95;
+    spec.lyapunov = [Lyapunov::Common, Lyapunov::Switched, Lyapunov::Dwell][seed as usize % 3];
+    spec.integral_weight = vec![0.3; r];
+    spec.input_weight = vec![0.1; dims.inputs];
+    spec
 }
 
 /// Units of all signals, evenly spread on the logarithmic scale from 1e-6 to 1e6.

@@ -1,8 +1,8 @@
 //! Random switched plants with certified designs, for benches and property tests.
 #![allow(dead_code, missing_docs)]
 
-use ftc_control::parameters::{Compensation, EstimatorMethod};
-use ftc_design::assembly::{EstimatorSpec, KnownDisturbance, Request, assemble};
+use ftc_control::parameters::EstimatorMethod;
+use ftc_design::assembly::{KnownDisturbance, Request, assemble};
 use ftc_design::{ControlSpec, Design, Lyapunov, ObserverChoice, ObserverSpec, Signals};
 use ftc_plant::Scenario;
 use ftc_plant::scenario::Waveform;
@@ -75,15 +75,13 @@ pub fn design_with(dice: &mut Dice, method: EstimatorMethod) -> Design {
         );
         let dims = plant.dimensions();
         let r = p.min(m).min(n);
-        let control = ControlSpec {
-            tracked: (0..r).collect(),
-            lyapunov: Lyapunov::Dwell,
-            decay: 0.95,
-            output_weight: vec![1.0; r],
-            integral_weight: vec![0.3 / plant.sample_time; r],
-            input_weight: vec![0.3; m],
-            ..ControlSpec::unweighted(dims)
-        };
+        let mut control = ControlSpec::unweighted(dims);
+        control.tracked = (0..r).collect();
+        control.lyapunov = Lyapunov::Dwell;
+        control.decay = 0.95;
+        control.output_weight = vec![1.0; r];
+        control.integral_weight = vec![0.3 / plant.sample_time; r];
+        control.input_weight = vec![0.3; m];
         let period = dice.between(40.0, 300.0) * plant.sample_time;
         let seed = dice.0.next_u64();
         let reference = (0..r).map(|_| Waveform::Square {
@@ -100,32 +98,13 @@ pub fn design_with(dice: &mut Dice, method: EstimatorMethod) -> Design {
             phase: 0.0,
             offset: 0.0,
         }];
-        let request = Request {
-            name: "random".into(),
-            signals: Signals::numbered(dims),
-            plant,
-            control,
-            bumpless: false,
-            feedforward: true,
-            observer: ObserverSpec {
-                kind: ObserverChoice::Auto,
-                decay: 0.9,
-                lyapunov: Lyapunov::Dwell,
-                noise: Vec::new(),
-            },
-            estimator: EstimatorSpec {
-                method,
-                disturbance: Some(KnownDisturbance {
-                    period,
-                    harmonics: 1,
-                    amplitude: Some(vec![0.05]),
-                }),
-                ..EstimatorSpec::default()
-            },
-            compensation: Compensation::VirtualSensor,
-            true_plant: ftc_plant::TruePlant::AsDesigned,
-            scenario,
-        };
+        let mut request = Request::new("random", plant, Signals::numbered(dims), scenario);
+        request.control = control;
+        request.observer = ObserverSpec::new(ObserverChoice::Auto, 0.9, Lyapunov::Dwell);
+        request.estimator.method = method;
+        let mut disturbance = KnownDisturbance::new(period);
+        disturbance.amplitude = Some(vec![0.05]);
+        request.estimator.disturbance = Some(disturbance);
         if let Ok(design) = assemble(request) {
             return design;
         }

@@ -125,12 +125,12 @@ pub(crate) fn fit(
     }
     let (a, b) = grey.matrices(&theta);
     Ok(Fit {
-        mode: FittedMode {
-            a: plain(&a),
-            b: plain(&b),
-            fit: grey.percent(&judges, &theta),
-            fit_of_model: grey.percent(&judges, &model),
-        },
+        mode: FittedMode::new(
+            plain(&a),
+            plain(&b),
+            grey.percent(&judges, &theta),
+            grey.percent(&judges, &model),
+        ),
         deviation: grey.unexplained(&judges, &theta).as_slice().to_vec(),
         model_error: left.max(LEAST_ERROR.min(model_error)),
     })

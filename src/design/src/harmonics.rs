@@ -14,6 +14,7 @@ use nalgebra::{Complex, DMatrix, DVector};
 
 /// What is known of the periodic disturbance.
 #[derive(Clone, Debug, PartialEq)]
+#[non_exhaustive]
 pub struct KnownDisturbance {
     /// Period in seconds.
     pub period: f64,

@@ -18,7 +18,8 @@
 //! };
 //! let plant = SwitchedPlant::new(1.0, vec![mode(0.9), mode(0.8)]);
 //! let scaling = Scaling::automatic(&plant);
-//! let spec = ControlSpec { decay: 0.98, ..ControlSpec::new(&scaling) };
+//! let mut spec = ControlSpec::new(&scaling);
+//! spec.decay = 0.98;
 //! let control = state_feedback::synthesise(&plant, &spec, &scaling)?;
 //! control.verify(&plant)?; // from the very doubles, without the solver
 //! assert!(control.spectral_radius.iter().all(|&radius| radius < 0.98));

@@ -26,6 +26,7 @@ const SHORTEST_MODE: f64 = 0.1;
 
 /// What happens in one run.
 #[derive(Clone, Debug, PartialEq)]
+#[non_exhaustive]
 pub struct Drawn {
     /// The experiment.
     pub scenario: Scenario,

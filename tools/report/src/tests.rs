@@ -4,9 +4,7 @@ use super::figure::{Figure, Mark, Series};
 use super::page::{Column, KeyNumber, Page, Row, Section, Table};
 use super::simulate::{Extent, SimulateError, TableOfSamples};
 use super::{Digest, demo, svg};
-use ftc_control::parameters::{
-    Compensation, Estimator, EstimatorMethod, FeedbackGains, Observer, ObserverKind, StateFeedback,
-};
+use ftc_control::parameters::{Compensation, Estimator, FeedbackGains, Observer, StateFeedback};
 use ftc_control::{Controller, Matrix};
 use ftc_design::{ControllerDesign, Design, Signal, Signals};
 use ftc_plant::scenario::{FaultEvent, FaultKind, ModeInterval, Waveform};
@@ -24,9 +22,10 @@ const HOSTILE: &str = "<script>alert(1)</script> & \"y'\" ]]> \u{1}";
 
 fn signals(count: usize, symbol: &str, unit: Option<&str>) -> Vec<Signal> {
     (1..=count)
-        .map(|index| Signal {
-            unit: unit.map(String::from),
-            ..Signal::new(&format!("{symbol}[{index}]"))
+        .map(|index| {
+            let mut signal = Signal::new(&format!("{symbol}[{index}]"));
+            signal.unit = unit.map(String::from);
+            signal
         })
         .collect()
 }
@@ -50,55 +49,25 @@ fn lags(outputs: usize, disturbances: usize, steps: u64) -> Design {
             DMatrix::zeros(outputs, disturbances),
         )
     };
-    let gains = FeedbackGains {
-        state_feedback: diagonal(-0.1),
-        integral: diagonal(0.2),
-        feedforward: Matrix::zeros(outputs, 0),
-        previous_input: Matrix::zeros(outputs, 0),
-        anti_windup: diagonal(0.0),
-        output_feedback: diagonal(-0.1),
-    };
+    let gains = FeedbackGains::new(diagonal(-0.1), diagonal(0.2), diagonal(-0.1));
     let plant = SwitchedPlant::new(0.01, vec![mode(0.5), mode(0.7)]);
     let at = |time: f64| time * steps as f64 * 0.01;
-    let signals = Signals {
-        inputs: signals(outputs, "u", Some("V")),
-        outputs: signals(outputs, "y", Some("A")),
-        states: signals(outputs, "x", None),
-        disturbances: Vec::new(),
-    };
-    let controller = ControllerDesign {
-        feedback: StateFeedback {
-            tracked: (0..outputs).collect(),
-            latency: 0,
-            resonators: vec![],
-            transfer: None,
-            modes: vec![gains; 2],
-        },
-        observer: Observer {
-            kind: ObserverKind::Luenberger,
-            note: Some("no disturbance to decouple".into()),
-            gains: vec![diagonal(0.4); 2],
-            decoupling: vec![vec![diagonal(0.0); 2]; 2],
-            lost: Vec::new(),
-            minimum_dwell: 0,
-        },
-        estimator: Estimator {
-            method: EstimatorMethod::None,
-            hypotheses: None,
-            response_length: 0,
-            window: 0,
-            predictors: vec![],
-            adapt: false,
-            harmonics: None,
-            harmonic_transfers: vec![],
-            thresholds: vec![0.1; outputs],
-            debounce: 1,
-            stuck_after: 0,
-            leverage_limit: 100.0,
-            largest_fault: vec![1e6; outputs],
-        },
-        compensation: Compensation::None,
-    };
+    let signals = Signals::new(
+        signals(outputs, "u", Some("V")),
+        signals(outputs, "y", Some("A")),
+        signals(outputs, "x", None),
+    );
+    let mut observer = Observer::luenberger(vec![diagonal(0.4); 2]);
+    observer.note = Some("no disturbance to decouple".into());
+    let mut estimator = Estimator::none(outputs);
+    estimator.thresholds = vec![0.1; outputs];
+    estimator.largest_fault = vec![1e6; outputs];
+    let controller = ControllerDesign::new(
+        StateFeedback::new((0..outputs).collect(), vec![gains; 2]),
+        observer,
+        estimator,
+        Compensation::None,
+    );
     let mut scenario = Scenario::new(
         steps,
         vec![

@@ -141,12 +141,10 @@ pub fn latency() -> Result<Latency, Error> {
     let gains = prompt.for_controller(&plant).modes;
     let ignored = plant.modes.iter().zip(&gains);
     let delayed = |lyapunov| {
-        let spec = ControlSpec {
-            latency: 1,
-            decay: DECAY,
-            lyapunov,
-            ..control.clone()
-        };
+        let mut spec = control.clone();
+        spec.latency = 1;
+        spec.decay = DECAY;
+        spec.lyapunov = lyapunov;
         match synthesise(&plant, &spec) {
             Ok(feedback) => Ok(Some(feedback)),
             Err(DesignError::Infeasible(_)) => Ok(None),
