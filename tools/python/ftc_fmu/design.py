@@ -17,7 +17,7 @@ from ftc_fmu.log import Log
 from ftc_fmu.run import Run
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping, Sequence
+    from collections.abc import Callable, Iterator, Mapping, Sequence
     from os import PathLike
 
     from ftc_fmu.plant import Plant
@@ -65,14 +65,14 @@ class Design:
         return to_toml(self.document)
 
     def save(self, path: str | PathLike[str]) -> Path:
-        """Writes the design file and, beside it, the logs that it names.
+        """Writes the design file and, beside it, the files that it names: matrices, logs and tables.
 
         Returns:
             The path of the design file.
         """
         path = Path(path)
         path.parent.mkdir(parents=True, exist_ok=True)
-        for file in _logs(self.document):
+        for file in _files(self.document):
             source, target = self._folder / file, path.parent / file
             if source.exists() and source.resolve() != target.resolve():
                 target.parent.mkdir(parents=True, exist_ok=True)
@@ -280,8 +280,21 @@ def _with_logs(tables: dict[str, Any]) -> tuple[Path, dict[str, Any]]:
     return folder, tables | {"estimator": {**estimator, "database": files}}
 
 
-def _logs(document: dict[str, Any]) -> list[str]:
-    """Files that a design file names: its logs."""
+def _files(document: dict[str, Any]) -> list[str]:
+    """Files that a design file names: matrices of modes, logs, tables of a scenario."""
     database = document.get("estimator", {}).get("database")
-    files = [database] if isinstance(database, str) else database or []
-    return [file for file in files if file not in ("commission", "model")]
+    logs = [database] if isinstance(database, str) else database or []
+    return [file for file in logs if file not in ("commission", "model")] + list(
+        _named([document.get("mode"), document.get("scenario")])
+    )
+
+
+def _named(value: object) -> Iterator[str]:
+    """Every text under a key `file`, however deep."""
+    if isinstance(value, dict):
+        if isinstance(value.get("file"), str):
+            yield value["file"]
+        value = list(value.values())
+    if isinstance(value, list):
+        for item in value:
+            yield from _named(item)

@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 import pytest
+import tomli_w
 
 import ftc_fmu as ftc
 from conftest import EXAMPLES
@@ -89,6 +90,25 @@ def test_examples_are_read_and_written(tmp_path: Path) -> None:
     logged = ftc.load(EXAMPLES / "logged.toml")
     again = ftc.load(logged.save(tmp_path / "copy" / "logged.toml"))
     assert again.core.record() == logged.core.record()
+
+
+def test_matrices_and_tables_come_along(tank: ftc.Design, tmp_path: Path) -> None:
+    """What `[[mode]] file` and a signal's `file` name, also from another folder."""
+    document = tank.document | {"mode": [], "scenario": {"steps": 20}}
+    for number, mode in enumerate(tank.document["mode"], 1):
+        named = {key: mode[key] for key in "ABCE" if key in mode}
+        np.savez(tmp_path / f"mode_{number}.npz", **{key: np.array(value) for key, value in named.items()})
+        document["mode"].append({key: value for key, value in mode.items() if key not in named})
+        document["mode"][-1] |= {"file": f"mode_{number}.npz"}
+    (tmp_path / "tables").mkdir()
+    (tmp_path / "tables" / "reference.csv").write_text("t,level\n0,1\n100,2\n")
+    signal = {"kind": "table", "file": "tables/reference.csv", "column": "level"}
+    document["scenario"]["reference"] = [signal, 0.0]
+    (tmp_path / "tank.toml").write_text(tomli_w.dumps(document))
+    first = ftc.load(tmp_path / "tank.toml")
+    again = ftc.load(first.save(tmp_path / "copy" / "tank.toml"))
+    assert again.core.record() == first.core.record()
+    np.testing.assert_array_equal(again.simulate()["y_ref"], first.simulate()["y_ref"])
 
 
 def test_a_design_travels(tank: ftc.Design) -> None:
