@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 from ftc_fmu import _core
 from ftc_fmu._place import HOME
-from ftc_fmu._plain import plain, table, to_toml, whole
+from ftc_fmu._plain import count, plain, table, to_toml, whole
 from ftc_fmu.controller import Controller
 from ftc_fmu.errors import DesignFileError
 from ftc_fmu.log import Log
@@ -114,6 +114,8 @@ class Design:
     ) -> list[Path]:
         """Writes NAME_controller.fmu and NAME_plant.fmu, and with `ssp` the package of both.
 
+        The plant FMU plays the design's own scenario, not one that was given to `simulate`.
+
         Args:
             out: Folder; made where there is none.
             fmi: Version of the interface; only "2.0" is there.
@@ -148,8 +150,8 @@ class Design:
 
     def __repr__(self) -> str:
         """Returns one line: name, modes, gains."""
-        gammas = self.report.get("gamma") or []
-        return f"<ftc_fmu.Design {self.name}: {len(gammas) or 'some'} modes, gamma {gammas}>"
+        modes = self.document.get("mode") or self.report.get("gamma") or []
+        return f"<ftc_fmu.Design {self.name}: {count(len(modes), 'mode')}, gamma {self.report.get('gamma')}>"
 
     def _repr_html_(self) -> str:
         """Shows the report in a notebook."""
@@ -201,7 +203,7 @@ def design(
     if control:
         document["controller"] = plain(control, "controller")
     document |= {key: plain(entries, key) for key, entries in tables.items()}
-    core = _core.solve(to_toml(document), str(folder), None, listener(progress), threads)
+    core = _core.solve(to_toml(document), str(folder), None, listener(progress), whole(threads, "threads", 1))
     return Design(core, document, folder)
 
 
@@ -220,7 +222,7 @@ def load(path: str | PathLike[str], *, progress: Progress = None, threads: int =
     """
     path = Path(path)
     text = _core.read_text(str(path))
-    core = _core.solve(text, str(path.parent), str(path), listener(progress), threads)
+    core = _core.solve(text, str(path.parent), str(path), listener(progress), whole(threads, "threads", 1))
     return Design(core, tomllib.loads(text.removeprefix("\ufeff")), path.parent)
 
 

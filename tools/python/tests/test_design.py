@@ -47,8 +47,8 @@ def test_threads_do_not_change_a_design(tmp_path: Path) -> None:
     path.write_text(text.replace('lyapunov = "common"', 'lyapunov = "dwell"'), encoding="utf-8")
     assert "dwell" in path.read_text(encoding="utf-8")
     assert ftc.load(path).record() == ftc.load(path, threads=3).record()
-    with pytest.raises(ftc.DesignFileError, match="threads is 0: give 1 to 1024"):
-        ftc.load(path, threads=0)
+    with pytest.raises(ftc.DesignFileError, match=r"threads is 1025: give 1 to 1024"):
+        ftc.load(path, threads=1025)
 
 
 def program(*arguments: object) -> subprocess.CompletedProcess:
@@ -125,6 +125,15 @@ def test_reports(tank: ftc.Design) -> None:
     page = tank._repr_html_()
     assert page.lower().count("<svg") >= 1
     assert "tank" in page
+
+
+@pytest.mark.parametrize("threads", [0, -1, "2", 1.5])
+def test_threads_are_a_whole_number(tanks: ftc.Plant, threads: object) -> None:
+    """Refused by name."""
+    with pytest.raises(ftc.DesignFileError, match=r"threads is .*: give a whole number from 1 on"):
+        ftc.design(tanks, threads=threads)
+    with pytest.raises(ftc.DesignFileError, match=r"threads is .*: give a whole number from 1 on"):
+        ftc.load(EXAMPLES / "tank.toml", threads=threads)
 
 
 def test_an_unknown_key_is_named(tanks: ftc.Plant) -> None:
