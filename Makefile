@@ -25,18 +25,19 @@ build:
 	cargo build --release --config tools/platforms/fmu.toml --package ftc-controller-fmu --package ftc-plant-fmu
 	tools/platforms/native.sh
 
+# What `make fmu-all` builds, and which FMU binaries the wheel carries (docs/platforms.md).
+PLATFORMS ?= linux64 win64 aarch64-linux
+
 # FMU binaries beyond those for this machine; `ftc-fmu export` packs whatever is built and is not
 # older than the program. The first needs glibc 2.17 only; the others see docs/platforms.md.
 fmu-linux64: build $(ZIG)/ready
 	PATH="$(CURDIR)/$(ZIG)/bin:$$PATH" tools/platforms/build.sh linux64
 
 fmu-all: build $(ZIG)/ready
-	PATH="$(CURDIR)/$(ZIG)/bin:$$PATH" tools/platforms/build.sh linux64 win64 aarch64-linux
+	PATH="$(CURDIR)/$(ZIG)/bin:$$PATH" tools/platforms/build.sh $(PLATFORMS)
 
 # The Python package with the program and FMU binaries inside, dist/ftc_fmu-*.whl. PLATFORMS says for
-# which systems its exports are; every one of them is built first (docs/platforms.md).
-PLATFORMS ?= linux64 win64 aarch64-linux
-
+# which systems its exports are; every one of them is built first.
 wheel: build $(ZIG)/ready
 	PATH="$(CURDIR)/$(ZIG)/bin:$$PATH" tools/platforms/build.sh $(PLATFORMS)
 	PATH="$(CURDIR)/$(ZIG)/bin:$$PATH" tools/python/build.sh $(PLATFORMS)
@@ -143,6 +144,7 @@ lint: $(VENV)/ready
 	$(IN_VENV)ruff check
 	$(IN_VENV)ruff format --check
 	$(PYTHON) tests/promises.py
+	$(PYTHON) tests/named.py
 
 # Each library crate as it would be published, built from its archive alone.
 LIBRARIES := ftc-plant ftc-control ftc-lapack ftc-design ftc-simulate ftc-identify

@@ -11,7 +11,7 @@ use ftc_plant::scenario::{FaultEvent, FaultKind, Waveform};
 use ftc_simulate::{PlantSimulator, Trajectory, Variant, run};
 use nalgebra::DVector;
 
-const KINDS: [(&str, FaultKind); 6] = [
+const KINDS: &[(&str, FaultKind)] = &[
     ("bias", FaultKind::Bias { size: 0.5 }),
     ("drift", FaultKind::Drift { slope: 0.004 }),
     ("gain loss", FaultKind::GainLoss { loss: 0.6 }),
@@ -128,7 +128,7 @@ fn every_kind_at_every_time_on_either_sensor_or_both() {
     for sensors in [&[0][..], &[1], &[0, 1]] {
         let unseen = unseen(sensors);
         println!("unseen faults on {sensors:?} move an output by up to {unseen:.3}");
-        for (name, kind) in KINDS {
+        for &(name, kind) in KINDS {
             for (when, from, until) in WINDOWS {
                 let events: Vec<_> = sensors
                     .iter()
@@ -171,8 +171,8 @@ fn every_kind_at_every_time_on_either_sensor_or_both() {
 #[test]
 fn different_faults_overlap() {
     let unseen = unseen(&[0, 1]);
-    for (first, kind) in KINDS {
-        for (second, other) in KINDS {
+    for &(first, kind) in KINDS {
+        for &(second, other) in KINDS {
             let events = [
                 FaultEvent {
                     sensor: 0,

@@ -2,7 +2,7 @@
 
     python tests/platforms/compare.py examples/paper.toml
 
-win64 runs under wine, aarch64-linux under qemu with that architecture's C library from Debian's
+win64 runs under wine, another processor's Linux under qemu with its C library from Debian's
 packages. Ends with an error if any bit differs.
 
 promise: three-platforms
@@ -36,6 +36,8 @@ COMPILERS = {
     "aarch64-linux": [ZIG, "-m", "ziglang", "cc", "-target", "aarch64-linux-gnu.2.17"],
 }
 LIBRARIES = {"linux64": ["-ldl"], "win64": [], "aarch64-linux": ["-ldl"]}
+# What runs another processor's programs, and that processor's name in Debian.
+EMULATORS = {"aarch64-linux": ("qemu-aarch64", "arm64")}
 
 
 def system_of(platform: str) -> list[str | Path]:
@@ -44,10 +46,14 @@ def system_of(platform: str) -> list[str | Path]:
         return []
     if platform == "win64":
         return [WINE]
+    emulator, architecture = EMULATORS[platform]
     root = subprocess.run(
-        [commands.ROOT / "tools" / "platforms" / "system.sh"], check=True, stdout=subprocess.PIPE, text=True
+        [commands.ROOT / "tools" / "platforms" / "system.sh", architecture],
+        check=True,
+        stdout=subprocess.PIPE,
+        text=True,
     ).stdout.strip()
-    return ["qemu-aarch64", "-L", root]
+    return [emulator, "-L", root]
 
 
 def uri(folder: Path, platform: str) -> str:

@@ -15,7 +15,7 @@ home=$PWD/target/platforms
 root=${UNPACK_INTO:-$home/rust}
 apt=(
     -qq -o Dir::State::lists="$home/apt/lists" -o Dir::Cache="$home/apt/cache"
-    -o Dir::State::status="$home/apt/status" -o APT::Architectures::=amd64 -o APT::Architectures::=arm64
+    -o Dir::State::status="$home/apt/status" -o APT::Architectures::=amd64
     -o APT::Sandbox::User="$(id -un)"
 )
 
@@ -23,6 +23,9 @@ apt=(
 unpack() {
     mkdir -p "$home/packages" "$home/apt/lists/partial" "$home/apt/cache/archives/partial" "$root"
     : >"$home/apt/status"
+    for package in "$@"; do
+        [[ $package != *:* ]] || apt+=(-o "APT::Architectures::=${package#*:}")
+    done
     apt-get "${apt[@]}" update >&2
     for package in "$@"; do
         rm -f "$home/packages/"*

@@ -28,7 +28,7 @@ pub struct Platform {
 }
 
 /// All of them.
-pub const PLATFORMS: [Platform; 3] = [
+pub const PLATFORMS: &[Platform] = &[
     Platform {
         name: "linux64",
         extension: "so",

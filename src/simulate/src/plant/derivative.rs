@@ -11,6 +11,7 @@ use ftc_plant::scenario::{FaultEvent, FaultKind};
 
 /// Small changes of the plant's inputs.
 #[derive(Clone, Copy, Debug)]
+#[expect(clippy::exhaustive_structs, reason = "the inputs of the plant")]
 pub struct Change<'a> {
     /// Of the command (m).
     pub command: &'a [f64],
@@ -61,27 +62,30 @@ impl PlantSimulator {
     fn differentiate_state(&self, trial: &mut PlantState, u: &[f64], change: &Change<'_>) {
         self.actuate(trial, u);
         self.actuate_change(trial, change.command);
-        if let TruePlant::Rectifier(rectifier) = &self.true_plant {
-            rectifier::differentiate_rectifier(
-                rectifier,
-                trial.mode,
-                &trial.x,
-                &rectifier::Held {
-                    input: [&trial.departed.applied, &trial.departed.change],
-                    disturbance: [&trial.disturbance, change.disturbance],
-                },
-                self.plant.sample_time,
-                &mut trial.next,
-            );
-            let _ = self.advance(trial, u);
-        } else {
-            let _ = self.advance(trial, u);
-            trial.next.fill(0.0);
-            let Some(mode) = self.modes.get(trial.mode) else {
-                return;
-            };
-            kernel::add_product(&mut trial.next, &mode.b, &trial.departed.change);
-            kernel::add_product(&mut trial.next, &mode.e, change.disturbance);
+        match &self.true_plant {
+            TruePlant::Rectifier(rectifier) => {
+                rectifier::differentiate_rectifier(
+                    rectifier,
+                    trial.mode,
+                    &trial.x,
+                    &rectifier::Held {
+                        input: [&trial.departed.applied, &trial.departed.change],
+                        disturbance: [&trial.disturbance, change.disturbance],
+                    },
+                    self.plant.sample_time,
+                    &mut trial.next,
+                );
+                let _ = self.advance(trial, u);
+            }
+            TruePlant::AsDesigned | TruePlant::Linear { .. } | TruePlant::Deviating { .. } => {
+                let _ = self.advance(trial, u);
+                trial.next.fill(0.0);
+                let Some(mode) = self.modes.get(trial.mode) else {
+                    return;
+                };
+                kernel::add_product(&mut trial.next, &mode.b, &trial.departed.change);
+                kernel::add_product(&mut trial.next, &mode.e, change.disturbance);
+            }
         }
     }
 
