@@ -35,16 +35,16 @@ fn no_plant_satisfies_them() {
         let n = lottery.between(1, 3);
         let a = 0.1 * lottery.matrix(n, n);
         let identity = DMatrix::identity(n, n);
-        let plant = SwitchedPlant {
-            sample_time: 1.0,
-            modes: vec![mode(
+        let plant = SwitchedPlant::new(
+            1.0,
+            vec![mode(
                 a,
                 identity.clone(),
                 identity,
                 DMatrix::from_element(n, 1, 0.01),
                 DMatrix::zeros(n, 1),
             )],
-        };
+        );
         assert!(!theorem_1(&plant).unwrap().feasible);
         let spec = ControlSpec::unweighted(plant.dimensions());
         assert!(!theorem_2(&plant, &spec).unwrap().feasible);

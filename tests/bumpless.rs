@@ -6,10 +6,10 @@
 
 use ftc_control::parameters::{Compensation, EstimatorMethod};
 use ftc_control::{Compensate, Controller};
-use ftc_design::assembly::{DatabaseSource, EstimatorSpec, Request, assemble};
-use ftc_design::{ControlSpec, Design, Lyapunov, Objective, ObserverChoice, ObserverSpec, Signals};
-use ftc_plant::scenario::{ModeInterval, Waveform};
-use ftc_plant::{Mode, OperatingPoint, Scenario, SwitchedPlant, TruePlant};
+use ftc_design::assembly::{DatabaseSource, Request, assemble};
+use ftc_design::{ControlSpec, Design, Lyapunov, ObserverChoice, ObserverSpec, Signals};
+use ftc_plant::scenario::Waveform;
+use ftc_plant::{Mode, Scenario, SwitchedPlant};
 use nalgebra::{DMatrix, DVector};
 
 fn single(value: f64) -> DMatrix<f64> {
@@ -18,63 +18,33 @@ fn single(value: f64) -> DMatrix<f64> {
 
 /// Two unstable modes of first order.
 fn plant() -> SwitchedPlant {
-    let mode = |a: f64| Mode {
-        name: format!("{a}"),
-        a: single(a),
-        b: single(1.0),
-        c: single(1.0),
-        e: single(1.0),
-        f: single(0.0),
-        operating_point: OperatingPoint::zero(1, 1, 1),
+    let mode = |a: f64| {
+        Mode::new(single(a), single(1.0), single(1.0))
+            .named(format!("{a}"))
+            .with_disturbance(single(1.0), single(0.0))
     };
-    SwitchedPlant {
-        sample_time: 1.0,
-        modes: vec![mode(1.2), mode(1.25)],
-    }
+    SwitchedPlant::new(1.0, vec![mode(1.2), mode(1.25)])
 }
 
 fn request(lyapunov: Lyapunov, bumpless: bool) -> Request {
-    Request {
-        name: "bump".into(),
-        signals: Signals::numbered(plant().dimensions()),
-        plant: plant(),
-        true_plant: TruePlant::AsDesigned,
-        control: ControlSpec {
-            tracked: vec![0],
-            latency: 0,
-            lyapunov,
-            decay: 0.9,
-            objective: Objective::Attenuation,
-            resonators: Vec::new(),
-            output_weight: vec![1.0],
-            integral_weight: vec![0.3],
-            input_weight: vec![0.1],
-        },
-        bumpless,
-        feedforward: false,
-        observer: ObserverSpec {
-            kind: ObserverChoice::Luenberger,
-            decay: 0.6,
-            lyapunov,
-            noise: Vec::new(),
-        },
-        estimator: EstimatorSpec {
-            method: EstimatorMethod::None,
-            database: DatabaseSource::Model,
-            ..EstimatorSpec::default()
-        },
-        compensation: Compensation::None,
-        scenario: Scenario {
-            steps: 200,
-            noise: vec![0.0],
-            seed: 1,
-            schedule: vec![ModeInterval { from: 0.0, mode: 0 }],
-            reference: vec![Waveform::ZERO],
-            fault: vec![Waveform::ZERO],
-            events: Vec::new(),
-            disturbance: vec![Waveform::ZERO],
-        },
-    }
+    let mut request = Request::new(
+        "bump",
+        plant(),
+        Signals::numbered(plant().dimensions()),
+        Scenario::new(200, vec![Waveform::ZERO], plant().dimensions()),
+    );
+    request.control = ControlSpec::unweighted(plant().dimensions());
+    request.control.lyapunov = lyapunov;
+    request.control.decay = 0.9;
+    request.control.integral_weight = vec![0.3];
+    request.control.input_weight = vec![0.1];
+    request.bumpless = bumpless;
+    request.feedforward = false;
+    request.observer = ObserverSpec::new(ObserverChoice::Luenberger, 0.6, lyapunov);
+    request.estimator.method = EstimatorMethod::None;
+    request.estimator.database = DatabaseSource::Model;
+    request.compensation = Compensation::None;
+    request
 }
 
 /// The largest output and the largest jumps of the command at switches that may and may not be smooth,

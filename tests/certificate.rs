@@ -16,12 +16,7 @@ use plants::{Channel, Lottery, paper, paper_spec};
 
 fn designed(lyapunov: Lyapunov, latency: usize) -> (SwitchedPlant, Synthesis) {
     let plant = paper(Channel::State);
-    let observer = ObserverSpec {
-        kind: ObserverChoice::Auto,
-        decay: 0.5,
-        lyapunov,
-        noise: Vec::new(),
-    };
+    let observer = ObserverSpec::new(ObserverChoice::Auto, 0.5, lyapunov);
     let control: ControlSpec = paper_spec(latency, 0.9, lyapunov);
     let synthesis = synthesise(&plant, &control, &observer, &Scaling::automatic(&plant)).unwrap();
     (plant, synthesis)

@@ -182,21 +182,20 @@ fn eventful() -> Scenario {
         until,
         kind,
     };
-    Scenario {
-        schedule: vec![
-            ModeInterval { from: 0.0, mode: 0 },
-            ModeInterval { from: 6.0, mode: 1 },
-        ],
-        events: vec![
-            event(0, 3.0, 5.0, FaultKind::GainLoss { loss: 0.3 }),
-            event(0, 4.0, 6.0, FaultKind::Bias { size: 0.2 }),
-            event(1, 4.0, 7.0, FaultKind::Stuck),
-            event(0, 8.0, 10.0, FaultKind::Dropout),
-            event(1, 8.0, 10.0, FaultKind::Drift { slope: 0.1 }),
-            event(1, 9.0, 10.0, FaultKind::GainLoss { loss: 0.5 }),
-        ],
-        ..scenario(reference("square"), 0.005, 1)
-    }
+    let mut scenario = scenario(reference("square"), 0.005, 1);
+    scenario.schedule = vec![
+        ModeInterval { from: 0.0, mode: 0 },
+        ModeInterval { from: 6.0, mode: 1 },
+    ];
+    scenario.events = vec![
+        event(0, 3.0, 5.0, FaultKind::GainLoss { loss: 0.3 }),
+        event(0, 4.0, 6.0, FaultKind::Bias { size: 0.2 }),
+        event(1, 4.0, 7.0, FaultKind::Stuck),
+        event(0, 8.0, 10.0, FaultKind::Dropout),
+        event(1, 8.0, 10.0, FaultKind::Drift { slope: 0.1 }),
+        event(1, 9.0, 10.0, FaultKind::GainLoss { loss: 0.5 }),
+    ];
+    scenario
 }
 
 fn rectifier() -> (PlantSimulator, [f64; 2]) {
@@ -210,11 +209,9 @@ fn rectifier() -> (PlantSimulator, [f64; 2]) {
         loads: vec![80.0, 40.0],
     };
     let plant = rectifier.linearise(5e-3).unwrap();
-    let scenario = Scenario {
-        schedule: vec![ModeInterval { from: 0.0, mode: 0 }],
-        disturbance: vec![Waveform::Constant { value: 1.0 }],
-        ..scenario(reference("constant"), 0.0, 1)
-    };
+    let mut scenario = scenario(reference("constant"), 0.0, 1);
+    scenario.schedule = vec![ModeInterval { from: 0.0, mode: 0 }];
+    scenario.disturbance = vec![Waveform::Constant { value: 1.0 }];
     let simulator =
         PlantSimulator::with_true_plant(plant, TruePlant::Rectifier(rectifier), scenario);
     (simulator, [12.0, -3.0])

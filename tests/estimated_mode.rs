@@ -25,10 +25,9 @@ fn error(run: &Trajectory, tracked: &[usize]) -> f64 {
 
 /// The loop whose mode is found, and the same told the fault, and the mode one sample late.
 fn both(plant: &SwitchedPlant, scenario: &Scenario, controller: &Controller) -> [Trajectory; 2] {
-    let late = TruePlant::AsDesigned.with_deviation(Deviation {
-        mode_delay: 1,
-        ..Deviation::default()
-    });
+    let mut deviation = Deviation::default();
+    deviation.mode_delay = 1;
+    let late = TruePlant::AsDesigned.with_deviation(deviation);
     let simulator = |truth| PlantSimulator::with_true_plant(plant.clone(), truth, scenario.clone());
     let found = run(&simulator(TruePlant::AsDesigned), controller, Variant::Ftc);
     let told = run(&simulator(late), controller, Variant::ToldTheFault);

@@ -5,15 +5,15 @@ mod common;
 use common::{Channel, plant, reference, scenario};
 use core::f64::consts::TAU;
 use ftc_control::Controller;
-use ftc_control::parameters::{Compensation, EstimatorMethod};
-use ftc_design::assembly::{EstimatorSpec, KnownDisturbance, Request, assemble};
+use ftc_control::parameters::EstimatorMethod;
+use ftc_design::assembly::{KnownDisturbance, Request, assemble};
 use ftc_design::{
     ControlSpec, Design, DesignError, Lyapunov, ObserverChoice, ObserverSpec, Signals,
     check_controllable, state_feedback,
 };
 use ftc_plant::scaling::Scaling;
 use ftc_plant::scenario::{ModeInterval, Waveform};
-use ftc_plant::{Mode, OperatingPoint, SwitchedPlant};
+use ftc_plant::{Mode, SwitchedPlant};
 use ftc_simulate::{PlantSimulator, Variant, run};
 use nalgebra::{DMatrix, dmatrix};
 
@@ -22,49 +22,35 @@ const ANGLE: f64 = 0.02;
 
 /// The weights of the reference table, with the first `harmonics` in the internal model.
 fn spec(latency: usize, lyapunov: Lyapunov, decay: f64, harmonics: usize) -> ControlSpec {
-    ControlSpec {
-        latency,
-        lyapunov,
-        decay,
-        resonators: disturbance(harmonics).angles(1.0),
-        integral_weight: vec![0.3; 2],
-        input_weight: vec![0.1; 2],
-        ..ControlSpec::unweighted(plant(Channel::State).dimensions())
-    }
+    let mut spec = ControlSpec::unweighted(plant(Channel::State).dimensions());
+    spec.latency = latency;
+    spec.lyapunov = lyapunov;
+    spec.decay = decay;
+    spec.resonators = disturbance(harmonics).angles(1.0);
+    spec.integral_weight = vec![0.3; 2];
+    spec.input_weight = vec![0.1; 2];
+    spec
 }
 
 fn disturbance(harmonics: usize) -> KnownDisturbance {
-    KnownDisturbance {
-        period: TAU / ANGLE,
-        harmonics,
-        amplitude: Some(vec![0.04]),
-    }
+    let mut disturbance = KnownDisturbance::new(TAU / ANGLE);
+    disturbance.harmonics = harmonics;
+    disturbance.amplitude = Some(vec![0.04]);
+    disturbance
 }
 
 fn design(channel: Channel, control: ControlSpec) -> Design {
-    assemble(Request {
-        name: "resonant".into(),
-        signals: Signals::numbered(plant(channel).dimensions()),
-        plant: plant(channel),
-        bumpless: false,
-        feedforward: true,
-        observer: ObserverSpec {
-            kind: ObserverChoice::Auto,
-            decay: 0.7,
-            lyapunov: control.lyapunov,
-            noise: Vec::new(),
-        },
-        estimator: EstimatorSpec {
-            method: EstimatorMethod::Reference,
-            disturbance: Some(disturbance(1)),
-            ..EstimatorSpec::default()
-        },
-        compensation: Compensation::VirtualSensor,
-        true_plant: ftc_plant::TruePlant::AsDesigned,
-        scenario: scenario(reference("sine"), 0.0, 1),
-        control,
-    })
-    .unwrap()
+    let mut request = Request::new(
+        "resonant",
+        plant(channel),
+        Signals::numbered(plant(channel).dimensions()),
+        scenario(reference("sine"), 0.0, 1),
+    );
+    request.observer = ObserverSpec::new(ObserverChoice::Auto, 0.7, control.lyapunov);
+    request.estimator.method = EstimatorMethod::Reference;
+    request.estimator.disturbance = Some(disturbance(1));
+    request.control = control;
+    assemble(request).unwrap()
 }
 
 #[test]
@@ -124,12 +110,10 @@ fn residual(control: &ControlSpec, angle: f64) -> f64 {
 
 #[test]
 fn a_disturbance_at_a_harmonic_vanishes() {
-    let one_of_two = ControlSpec {
-        tracked: vec![1],
-        output_weight: vec![1.0],
-        integral_weight: vec![0.3],
-        ..spec(0, Lyapunov::Common, 0.95, 1)
-    };
+    let mut one_of_two = spec(0, Lyapunov::Common, 0.95, 1);
+    one_of_two.tracked = vec![1];
+    one_of_two.output_weight = vec![1.0];
+    one_of_two.integral_weight = vec![0.3];
     for control in [
         spec(0, Lyapunov::Common, 0.95, 1),
         spec(0, Lyapunov::Switched, 0.95, 1),
@@ -137,10 +121,8 @@ fn a_disturbance_at_a_harmonic_vanishes() {
         spec(0, Lyapunov::Dwell, 0.95, 2),
         one_of_two,
     ] {
-        let without = ControlSpec {
-            resonators: vec![],
-            ..control.clone()
-        };
+        let mut without = control.clone();
+        without.resonators = vec![];
         for &angle in &control.resonators {
             let (plain, resonant) = (residual(&without, angle), residual(&control, angle));
             println!("{plain:.2e} -> {resonant:.2e}");
@@ -177,9 +159,10 @@ fn verdict(control: &ControlSpec) -> Result<(), DesignError> {
 
 #[test]
 fn harmonics_too_near_the_integrator_or_each_other_are_refused_with_limits_that_work() {
-    let with = |resonators: Vec<f64>| ControlSpec {
-        resonators,
-        ..spec(0, Lyapunov::Common, 0.95, 0)
+    let with = |resonators: Vec<f64>| {
+        let mut spec = spec(0, Lyapunov::Common, 0.95, 0);
+        spec.resonators = resonators;
+        spec
     };
     let pi = core::f64::consts::PI;
     for angle in [0.0, 1e-5, pi - 1e-5, pi, 4.0, -0.02, f64::NAN] {
@@ -210,27 +193,22 @@ fn advice_about_a_decay_too_fast_for_two_harmonics_is_good_advice() {
 #[test]
 fn a_harmonic_the_inputs_cannot_reach_is_named() {
     let scalar = |value| DMatrix::from_element(1, 1, value);
-    let blind = SwitchedPlant {
-        sample_time: 1.0,
-        modes: vec![Mode {
-            name: String::new(),
-            a: dmatrix![0.0, 1.0, 0.0; 0.0, 0.0, 1.0; 0.1, -0.2, 0.3],
-            b: dmatrix![0.0; 0.0; 1.0],
-            c: dmatrix![1.0, -2.0 * ANGLE.cos(), 1.0],
-            e: dmatrix![1.0; 0.0; 0.0],
-            f: scalar(0.0),
-            operating_point: OperatingPoint::zero(3, 1, 1),
-        }],
-    };
-    let control = ControlSpec {
-        resonators: vec![1.0, ANGLE],
-        ..ControlSpec::unweighted(blind.dimensions())
-    };
+    let blind = SwitchedPlant::new(
+        1.0,
+        vec![
+            Mode::new(
+                dmatrix![0.0, 1.0, 0.0; 0.0, 0.0, 1.0; 0.1, -0.2, 0.3],
+                dmatrix![0.0; 0.0; 1.0],
+                dmatrix![1.0, -2.0 * ANGLE.cos(), 1.0],
+            )
+            .with_disturbance(dmatrix![1.0; 0.0; 0.0], scalar(0.0)),
+        ],
+    );
+    let mut control = ControlSpec::unweighted(blind.dimensions());
+    control.resonators = vec![1.0, ANGLE];
     let error = check_controllable(&blind, &control, &Scaling::unit(3, 1, 1)).unwrap_err();
     assert!(error.to_string().contains("harmonic 2"), "{error}");
-    let sighted = ControlSpec {
-        resonators: vec![1.0],
-        ..control
-    };
+    let mut sighted = control;
+    sighted.resonators = vec![1.0];
     check_controllable(&blind, &sighted, &Scaling::unit(3, 1, 1)).unwrap();
 }

@@ -5,9 +5,7 @@
 mod plants;
 
 use ftc_design::observer::sets;
-use ftc_design::{
-    ControlSpec, Lyapunov, Objective, ObserverChoice, ObserverSpec, Synthesis, dense,
-};
+use ftc_design::{ControlSpec, Lyapunov, ObserverChoice, ObserverSpec, Synthesis, dense};
 use ftc_plant::scaling::Scaling;
 use ftc_plant::{SwitchedPlant, spectral_radius};
 use plants::{Channel, paper, random_plant};
@@ -19,23 +17,12 @@ fn synthesise(
 ) -> Option<Synthesis> {
     let dims = plant.dimensions();
     let r = dims.inputs.min(dims.outputs);
-    let control = ControlSpec {
-        tracked: (0..r).collect(),
-        latency: 0,
-        lyapunov,
-        decay: 0.97,
-        objective: Objective::Attenuation,
-        resonators: Vec::new(),
-        output_weight: vec![1.0; r],
-        integral_weight: vec![0.3; r],
-        input_weight: vec![0.1; dims.inputs],
-    };
-    let observer = ObserverSpec {
-        kind,
-        decay: 0.97,
-        lyapunov,
-        noise: Vec::new(),
-    };
+    let mut control = ControlSpec::unweighted(dims);
+    control.lyapunov = lyapunov;
+    control.decay = 0.97;
+    control.integral_weight = vec![0.3; r];
+    control.input_weight = vec![0.1; dims.inputs];
+    let observer = ObserverSpec::new(kind, 0.97, lyapunov);
     ftc_design::synthesise(plant, &control, &observer, &Scaling::automatic(plant)).ok()
 }
 

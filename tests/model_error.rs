@@ -7,13 +7,9 @@ mod common;
 
 use common::{Channel, REFERENCES, plant, reference, scenario};
 use ftc_control::Controller;
-use ftc_control::parameters::{Compensation, EstimatorMethod};
-use ftc_design::assembly::{
-    DatabaseSource, EstimatorSpec, KnownDisturbance, Request, Threshold, assemble,
-};
-use ftc_design::{
-    ControlSpec, Design, HypothesesSpec, ObserverChoice, ObserverSpec, Signals, commissioning,
-};
+use ftc_control::parameters::EstimatorMethod;
+use ftc_design::assembly::{DatabaseSource, KnownDisturbance, Request, assemble};
+use ftc_design::{ControlSpec, Design, ObserverChoice, ObserverSpec, Signals, commissioning};
 use ftc_plant::SwitchedPlant;
 use ftc_plant::TruePlant;
 use ftc_plant::noise::standard_normal;
@@ -50,53 +46,31 @@ fn design(
     let log = |(mode, seed): (&ftc_plant::Mode, u64)| {
         commissioning::commission(mode, &[1.0, 1.0], &[noise; 2], samples, seed)
     };
-    let control = ControlSpec {
-        decay: 0.7,
-        integral_weight: vec![0.3; 2],
-        input_weight: vec![0.1; 2],
-        ..ControlSpec::unweighted(dims)
-    };
-    let observer = ObserverSpec {
-        kind: ObserverChoice::Auto,
-        decay: 0.7,
-        lyapunov: ftc_design::Lyapunov::Common,
-        noise: Vec::new(),
-    };
-    assemble(Request {
-        name: "wrong".into(),
-        signals: Signals::numbered(dims),
-        plant: model.clone(),
-        true_plant: ftc_plant::TruePlant::AsDesigned,
-        control,
-        bumpless: false,
-        feedforward: true,
-        observer,
-        estimator: EstimatorSpec {
-            method,
-            response_length: Some(RESPONSE),
-            database: DatabaseSource::Recorded(
-                truth
-                    .modes
-                    .iter()
-                    .zip(1..)
-                    .map(|drawn| vec![log(drawn)])
-                    .collect(),
-            ),
-            threshold: Threshold::Sigmas(6.0),
-            debounce: 1,
-            stuck_after: 0,
-            adapt: false,
-            hypotheses: HypothesesSpec::default(),
-            disturbance: Some(KnownDisturbance {
-                period: core::f64::consts::TAU / 0.02,
-                harmonics: 1,
-                amplitude: None,
-            }),
-        },
-        compensation: Compensation::VirtualSensor,
-        scenario: scenario(reference("constant"), noise, 1),
-    })
-    .unwrap()
+    let mut control = ControlSpec::unweighted(dims);
+    control.decay = 0.7;
+    control.integral_weight = vec![0.3; 2];
+    control.input_weight = vec![0.1; 2];
+    let observer = ObserverSpec::new(ObserverChoice::Auto, 0.7, ftc_design::Lyapunov::Common);
+    let mut request = Request::new(
+        "wrong",
+        model.clone(),
+        Signals::numbered(dims),
+        scenario(reference("constant"), noise, 1),
+    );
+    request.control = control;
+    request.observer = observer;
+    request.estimator.method = method;
+    request.estimator.response_length = Some(RESPONSE);
+    request.estimator.database = DatabaseSource::Recorded(
+        truth
+            .modes
+            .iter()
+            .zip(1..)
+            .map(|drawn| vec![log(drawn)])
+            .collect(),
+    );
+    request.estimator.disturbance = Some(KnownDisturbance::new(core::f64::consts::TAU / 0.02));
+    assemble(request).unwrap()
 }
 
 /// The true squared error over that of the loop told the fault, worst of all draws first.

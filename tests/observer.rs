@@ -13,12 +13,7 @@ use nalgebra::DMatrix;
 use plants::{Channel, mode, paper, random_plant, rows};
 
 fn spec(kind: ObserverChoice, decay: f64, lyapunov: Lyapunov) -> ObserverSpec {
-    ObserverSpec {
-        kind,
-        decay,
-        lyapunov,
-        noise: Vec::new(),
-    }
+    ObserverSpec::new(kind, decay, lyapunov)
 }
 
 fn design(plant: &SwitchedPlant, spec: &ObserverSpec) -> Result<ObserverDesign, DesignError> {
@@ -96,10 +91,7 @@ fn hidden_disturbance() -> SwitchedPlant {
         rows([[0.0], [1.0]]),
         rows([[0.0]]),
     );
-    SwitchedPlant {
-        sample_time: 0.1,
-        modes: vec![single],
-    }
+    SwitchedPlant::new(0.1, vec![single])
 }
 
 #[test]
@@ -119,15 +111,17 @@ fn a_rank_condition_that_fails_is_named_and_auto_falls_back() {
 
 #[test]
 fn a_state_that_no_output_shows_is_named() {
-    let unseen = |pole: f64| SwitchedPlant {
-        sample_time: 1.0,
-        modes: vec![mode(
-            rows([[0.5, 0.0], [0.0, pole]]),
-            rows([[1.0], [0.5]]),
-            rows([[1.0, 0.0]]),
-            rows([[1.0], [0.0]]),
-            rows([[0.0]]),
-        )],
+    let unseen = |pole: f64| {
+        SwitchedPlant::new(
+            1.0,
+            vec![mode(
+                rows([[0.5, 0.0], [0.0, pole]]),
+                rows([[1.0], [0.5]]),
+                rows([[1.0, 0.0]]),
+                rows([[1.0], [0.0]]),
+                rows([[0.0]]),
+            )],
+        )
     };
     for kind in [ObserverChoice::Uio, ObserverChoice::Luenberger] {
         let request = spec(kind, 0.9, Lyapunov::Common);

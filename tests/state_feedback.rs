@@ -10,7 +10,7 @@ use ftc_design::{
     ControlSpec, DesignError, Lyapunov, Objective, Run, Solver, StateFeedback, Step, Units,
 };
 use ftc_plant::scaling::Scaling;
-use ftc_plant::{Mode, OperatingPoint, SwitchedPlant, spectral_radius};
+use ftc_plant::{Mode, SwitchedPlant, spectral_radius};
 use nalgebra::{Complex, DMatrix};
 use plants::{
     Channel, half_unstable, in_units, paper, paper_spec, random_plant, rectifier,
@@ -181,12 +181,10 @@ fn scaling_changes_neither_gamma_nor_the_verdict() {
     let scaled = synthesise(&plant, &spec, &Scaling::automatic(&plant)).unwrap();
     // The same plant in other units: its weights and its gamma follow.
     let foreign = nominal.apply(&plant);
-    let foreign_spec = ControlSpec {
-        output_weight: vec![90.0, 1e-4],
-        integral_weight: vec![0.3 * 90.0, 0.3 * 1e-4],
-        input_weight: vec![0.1 * 0.01, 0.1 * 7.0],
-        ..spec
-    };
+    let mut foreign_spec = spec;
+    foreign_spec.output_weight = vec![90.0, 1e-4];
+    foreign_spec.integral_weight = vec![0.3 * 90.0, 0.3 * 1e-4];
+    foreign_spec.input_weight = vec![0.1 * 0.01, 0.1 * 7.0];
     let foreign_units = synthesise(&foreign, &foreign_spec, &Scaling::automatic(&foreign)).unwrap();
     for design in [unscaled, scaled, foreign_units] {
         assert_agrees(design.gamma.unwrap()[0], 2.1146);
@@ -197,14 +195,12 @@ fn scaling_changes_neither_gamma_nor_the_verdict() {
 fn the_rectifier_in_si_units_meets_its_decay() {
     let plant = rectifier();
     for (lyapunov, decay) in [(Lyapunov::Dwell, 0.95), (Lyapunov::Common, 0.98)] {
-        let spec = ControlSpec {
-            lyapunov,
-            decay,
-            output_weight: vec![1.0 / 600.0, 1.0 / 30.0],
-            integral_weight: vec![10.0 / 600.0, 10.0 / 30.0],
-            input_weight: vec![0.1; 2],
-            ..ControlSpec::unweighted(plant.dimensions())
-        };
+        let mut spec = ControlSpec::unweighted(plant.dimensions());
+        spec.lyapunov = lyapunov;
+        spec.decay = decay;
+        spec.output_weight = vec![1.0 / 600.0, 1.0 / 30.0];
+        spec.integral_weight = vec![10.0 / 600.0, 10.0 / 30.0];
+        spec.input_weight = vec![0.1; 2];
         let design = synthesise(&plant, &spec, &Scaling::automatic(&plant)).unwrap();
         design.verify(&plant).unwrap();
         for mode in 0..2 {
@@ -223,14 +219,12 @@ fn random_plants_are_designed_certified_and_do_what_was_promised() {
                 [Lyapunov::Common, Lyapunov::Switched, Lyapunov::Dwell][seed as usize % 3];
             let dims = plant.dimensions();
             let r = dims.outputs.min(dims.inputs);
-            let spec = ControlSpec {
-                decay,
-                lyapunov,
-                latency: seed as usize / 3 % 2,
-                integral_weight: vec![0.3; r],
-                input_weight: vec![0.1; dims.inputs],
-                ..ControlSpec::unweighted(dims)
-            };
+            let mut spec = ControlSpec::unweighted(dims);
+            spec.decay = decay;
+            spec.lyapunov = lyapunov;
+            spec.latency = seed as usize / 3 % 2;
+            spec.integral_weight = vec![0.3; r];
+            spec.input_weight = vec![0.1; dims.inputs];
             let design = match synthesise(&plant, &spec, &Scaling::automatic(&plant)) {
                 Ok(design) => design,
                 Err(DesignError::Infeasible(verdict)) => {
@@ -262,10 +256,8 @@ fn random_plants_are_designed_certified_and_do_what_was_promised() {
 fn decay_alone_is_theorem_one() {
     let plant = paper(Channel::State);
     for lyapunov in [Lyapunov::Common, Lyapunov::Switched, Lyapunov::Dwell] {
-        let spec = ControlSpec {
-            objective: Objective::Decay,
-            ..paper_spec(0, 0.6, lyapunov)
-        };
+        let mut spec = paper_spec(0, 0.6, lyapunov);
+        spec.objective = Objective::Decay;
         let design = synthesise(&plant, &spec, &Scaling::automatic(&plant)).unwrap();
         assert_eq!(design.gamma, None);
         for mode in 0..2 {
@@ -304,19 +296,18 @@ fn advice_is_good_advice() {
         ) > 0
     );
     let unstable = half_unstable();
-    let one_output = ControlSpec {
-        tracked: vec![1],
-        output_weight: vec![1.0],
-        integral_weight: vec![0.3],
-        ..usual(&unstable, Lyapunov::Common, 0.9)
-    };
+    let mut one_output = usual(&unstable, Lyapunov::Common, 0.9);
+    one_output.tracked = vec![1];
+    one_output.output_weight = vec![1.0];
+    one_output.integral_weight = vec![0.3];
     assert!(assert_advice_works(&unstable, &one_output) > 0);
     let advised: usize = (0..12)
         .map(|seed| {
             let plant = random_plant(seed, 0.1);
             let latency = seed as usize % 2;
-            let spec = usual(&plant, Lyapunov::Common, 0.6);
-            assert_advice_works(&plant, &ControlSpec { latency, ..spec })
+            let mut spec = usual(&plant, Lyapunov::Common, 0.6);
+            spec.latency = latency;
+            assert_advice_works(&plant, &spec)
         })
         .sum();
     assert!(advised >= 6, "{advised} pieces of advice");
@@ -326,14 +317,13 @@ fn advice_is_good_advice() {
 fn usual(plant: &SwitchedPlant, lyapunov: Lyapunov, decay: f64) -> ControlSpec {
     let dims = plant.dimensions();
     let r = dims.outputs.min(dims.inputs);
-    ControlSpec {
-        lyapunov,
-        decay,
-        output_weight: vec![1.0; r],
-        integral_weight: vec![0.3; r],
-        input_weight: vec![0.1; dims.inputs],
-        ..ControlSpec::unweighted(dims)
-    }
+    let mut spec = ControlSpec::unweighted(dims);
+    spec.lyapunov = lyapunov;
+    spec.decay = decay;
+    spec.output_weight = vec![1.0; r];
+    spec.integral_weight = vec![0.3; r];
+    spec.input_weight = vec![0.1; dims.inputs];
+    spec
 }
 
 /// Decay rates and the optimal common gamma of [`three_modes`].
@@ -373,12 +363,10 @@ fn what_the_disturbance_does_not_reach_is_designed_all_the_same() {
     for lyapunov in [Lyapunov::Common, Lyapunov::Switched, Lyapunov::Dwell] {
         for decay in [0.9, 0.95, 0.98] {
             let plant = two_channels(&[0.1]);
-            let spec = ControlSpec {
-                tracked: vec![1],
-                output_weight: vec![1.0],
-                integral_weight: vec![0.3],
-                ..usual(&plant, lyapunov, decay)
-            };
+            let mut spec = usual(&plant, lyapunov, decay);
+            spec.tracked = vec![1];
+            spec.output_weight = vec![1.0];
+            spec.integral_weight = vec![0.3];
             assert_rejects(&plant, &spec, &[true]);
         }
     }
@@ -389,12 +377,10 @@ fn what_the_disturbance_does_not_reach_is_designed_all_the_same() {
     }
     for decay in [0.9, 0.92, 0.95, 0.97, 0.98, 0.99] {
         let plant = half_unstable();
-        let spec = ControlSpec {
-            tracked: vec![1],
-            output_weight: vec![1.0],
-            integral_weight: vec![0.3],
-            ..usual(&plant, Lyapunov::Dwell, decay)
-        };
+        let mut spec = usual(&plant, Lyapunov::Dwell, decay);
+        spec.tracked = vec![1];
+        spec.output_weight = vec![1.0];
+        spec.integral_weight = vec![0.3];
         assert_rejects(&plant, &spec, &[false, true]);
     }
 }
@@ -473,28 +459,20 @@ fn the_optimum_of_a_single_large_mode_is_known_at_once() {
         };
         let n = 10 + seed;
         let raw = random(1, n, n);
-        let mode = Mode {
-            name: String::new(),
-            a: &raw * (0.9 / raw.clone().singular_values().max()),
-            b: random(2, n, n / 2),
-            c: random(3, n / 2, n),
-            e: random(4, n, 1),
-            f: DMatrix::zeros(n / 2, 1),
-            operating_point: OperatingPoint::zero(n, n / 2, n / 2),
-        };
-        let plant = SwitchedPlant {
-            sample_time: 1.0,
-            modes: vec![mode],
-        };
+        let mode = Mode::new(
+            &raw * (0.9 / raw.clone().singular_values().max()),
+            random(2, n, n / 2),
+            random(3, n / 2, n),
+        )
+        .with_disturbance(random(4, n, 1), DMatrix::zeros(n / 2, 1));
+        let plant = SwitchedPlant::new(1.0, vec![mode]);
         let spec = usual(&plant, Lyapunov::Common, 0.97);
         let asked = AtomicUsize::new(0);
         let watch = |step: Step| {
             asked.fetch_add(usize::from(step == Step::GeneralSolver), Ordering::Relaxed);
         };
-        let run = Run {
-            watch: &watch,
-            ..Run::default()
-        };
+        let mut run = Run::default();
+        run.watch = &watch;
         let scaling = Scaling::automatic(&plant);
         let design = synthesise_with(&plant, &spec, &scaling, &run).unwrap();
         assert_eq!(design.is_optimal(0), Some(true), "{n} states");
@@ -509,10 +487,8 @@ fn more_tracked_outputs_than_inputs_are_refused_at_once() {
         mode.b = mode.b.columns(0, 1).into_owned();
         mode.operating_point.u.truncate(1);
     }
-    let spec = ControlSpec {
-        input_weight: vec![0.1],
-        ..paper_spec(0, 0.9, Lyapunov::Common)
-    };
+    let mut spec = paper_spec(0, 0.9, Lyapunov::Common);
+    spec.input_weight = vec![0.1];
     let error = synthesise(&plant, &spec, &Scaling::automatic(&plant)).unwrap_err();
     assert_eq!(
         error.to_string(),
@@ -555,10 +531,8 @@ fn units_change_neither_verdict_nor_gamma() {
 /// Both solvers come to the same gamma.
 #[test]
 fn both_solvers_agree() {
-    let general = Run {
-        solver: Solver::General,
-        ..Run::default()
-    };
+    let mut general = Run::default();
+    general.solver = Solver::General;
     let mut compared = 0;
     for seed in 0..9 {
         let plant = random_plant(seed, 1.0);

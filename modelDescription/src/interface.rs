@@ -11,6 +11,10 @@ use crate::{Causality, Kind, Role, Span, Variability, Variable, VariableTable};
 
 /// What the user says about a signal.
 #[derive(Clone, Debug, Default, PartialEq)]
+#[expect(
+    clippy::exhaustive_structs,
+    reason = "what FMI 2.0 can say of a signal"
+)]
 pub struct SignalInfo {
     /// The user's name; empty for the default (`u[1]`, `y[1]`, `x[1]`).
     pub name: String,
@@ -28,6 +32,10 @@ pub struct SignalInfo {
 
 /// The sizes and signal names of a design, all that the tables need of it.
 #[derive(Clone, Debug, PartialEq)]
+#[expect(
+    clippy::exhaustive_structs,
+    reason = "whoever describes an FMU must say all of it"
+)]
 pub struct Interface {
     /// `Te` in seconds.
     pub sample_time: f64,

@@ -4,6 +4,7 @@ use crate::{Causality, Role, Variable};
 
 /// A contiguous range of value references: one vector of variables.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[non_exhaustive]
 pub struct Span {
     /// Value reference of the first element.
     pub first: u32,

@@ -1,4 +1,9 @@
 //! One scalar variable of an FMU.
+#![expect(
+    clippy::exhaustive_structs,
+    clippy::exhaustive_enums,
+    reason = "FMI 2.0 says what a variable has"
+)]
 
 /// How a variable is used by the importer (FMI 2.0, section 2.2.7).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

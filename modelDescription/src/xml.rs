@@ -15,6 +15,10 @@ pub const GENERATION_TIME: &str = "2026-01-01T00:00:00Z";
 
 /// Everything in a description besides the variables.
 #[derive(Clone, Debug)]
+#[expect(
+    clippy::exhaustive_structs,
+    reason = "whoever writes a description must say all of it"
+)]
 pub struct Document<'a> {
     /// Name of the model, for a person.
     pub model_name: &'a str,

@@ -7,7 +7,7 @@ use ftc_design::{
     ControlSpec, DesignError, Lyapunov, ObserverChoice, ObserverSpec, SolverFailure, synthesise,
 };
 use ftc_plant::scaling::Scaling;
-use ftc_plant::{Mode, OperatingPoint, SwitchedPlant, spectral_radius};
+use ftc_plant::{Mode, SwitchedPlant, spectral_radius};
 use nalgebra::DMatrix;
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::{Rng, SeedableRng};
@@ -28,40 +28,30 @@ fn plant(dice: &mut ChaCha8Rng, n: usize, modes: usize) -> SwitchedPlant {
     let a = matrix(dice, n, n);
     let a = &a * (0.8 / spectral_radius(&a));
     let (b, c, e) = (matrix(dice, n, m), matrix(dice, p, n), matrix(dice, n, 1));
-    let mode = |dice: &mut ChaCha8Rng| Mode {
-        name: "random".into(),
-        a: &a + 0.02 * matrix(dice, n, n),
-        b: &b + 0.02 * matrix(dice, n, m),
-        c: c.clone(),
-        e: e.clone(),
-        f: DMatrix::zeros(p, 1),
-        operating_point: OperatingPoint::zero(n, m, p),
+    let mode = |dice: &mut ChaCha8Rng| {
+        Mode::new(
+            &a + 0.02 * matrix(dice, n, n),
+            &b + 0.02 * matrix(dice, n, m),
+            c.clone(),
+        )
+        .named("random")
+        .with_disturbance(e.clone(), DMatrix::zeros(p, 1))
     };
-    SwitchedPlant {
-        sample_time: 1.0,
-        modes: (0..modes).map(|_| mode(dice)).collect(),
-    }
+    SwitchedPlant::new(1.0, (0..modes).map(|_| mode(dice)).collect())
 }
 
 /// Seconds of one design, and what came of it.
 fn timed(plant: &SwitchedPlant, lyapunov: Lyapunov) -> (f64, &'static str) {
     let dims = plant.dimensions();
     let tracked = 1;
-    let control = ControlSpec {
-        tracked: (0..tracked).collect(),
-        lyapunov,
-        decay: 0.97,
-        output_weight: vec![1.0; tracked],
-        integral_weight: vec![0.3; tracked],
-        input_weight: vec![0.3; dims.inputs],
-        ..ControlSpec::unweighted(dims)
-    };
-    let observer = ObserverSpec {
-        kind: ObserverChoice::Auto,
-        decay: 0.97,
-        lyapunov,
-        noise: Vec::new(),
-    };
+    let mut control = ControlSpec::unweighted(dims);
+    control.tracked = (0..tracked).collect();
+    control.lyapunov = lyapunov;
+    control.decay = 0.97;
+    control.output_weight = vec![1.0; tracked];
+    control.integral_weight = vec![0.3; tracked];
+    control.input_weight = vec![0.3; dims.inputs];
+    let observer = ObserverSpec::new(ObserverChoice::Auto, 0.97, lyapunov);
     let begin = Instant::now();
     let scaling = Scaling::automatic(plant);
     let outcome = match synthesise(plant, &control, &observer, &scaling) {

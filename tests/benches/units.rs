@@ -19,10 +19,8 @@ fn main() {
             fallbacks.fetch_add(1, Ordering::Relaxed);
         }
     };
-    let run = Run {
-        watch: &count,
-        ..Run::default()
-    };
+    let mut run = Run::default();
+    run.watch = &count;
     let (mut designed, mut infeasible, mut worst) = (0, 0, 0.0_f64);
     let mut refused = Vec::new();
     for seed in 0..200 {

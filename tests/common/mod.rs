@@ -1,18 +1,18 @@
 //! The paper's example, built by hand: plant, scenario and a controller with fixed gains.
 #![allow(dead_code, missing_docs)]
 
+use ftc_control::ControllerParameters;
 use ftc_control::parameters::{
-    Compensation, Estimator, EstimatorMethod, FeedbackGains, Harmonics, Limits, Observer,
-    ObserverKind, StateFeedback,
+    Compensation, Estimator, EstimatorMethod, FeedbackGains, Harmonics, Observer, ObserverKind,
+    StateFeedback,
 };
-use ftc_control::{ControllerParameters, Matrix};
 use ftc_design::assembly::KnownDisturbance;
 use ftc_design::{
     ControllerDesign, HypothesesSpec, Signal, Signals, commissioning, mode_models, plain,
 };
 use ftc_plant::Scenario;
 use ftc_plant::scenario::{ModeInterval, Waveform};
-use ftc_plant::{Mode, OperatingPoint, SwitchedPlant};
+use ftc_plant::{Dimensions, Mode, SwitchedPlant};
 use nalgebra::{DMatrix, dmatrix};
 
 /// Where the disturbance enters.
@@ -27,18 +27,14 @@ pub fn plant(channel: Channel) -> SwitchedPlant {
         Channel::State => (dmatrix![1.0; 1.0], dmatrix![0.0; 0.0]),
         Channel::Output => (dmatrix![0.0; 0.0], dmatrix![1.0; 1.0]),
     };
-    let mode = |name: &str, a: DMatrix<f64>, b: DMatrix<f64>| Mode {
-        name: name.into(),
-        a,
-        b,
-        c: DMatrix::identity(2, 2),
-        e: e.clone(),
-        f: f.clone(),
-        operating_point: OperatingPoint::zero(2, 2, 2),
+    let mode = |name: &str, a: DMatrix<f64>, b: DMatrix<f64>| {
+        Mode::new(a, b, DMatrix::identity(2, 2))
+            .named(name)
+            .with_disturbance(e.clone(), f.clone())
     };
-    SwitchedPlant {
-        sample_time: 1.0,
-        modes: vec![
+    SwitchedPlant::new(
+        1.0,
+        vec![
             mode(
                 "first",
                 dmatrix![0.6, 0.45; -0.2, 0.3],
@@ -50,7 +46,7 @@ pub fn plant(channel: Channel) -> SwitchedPlant {
                 DMatrix::identity(2, 2),
             ),
         ],
-    }
+    )
 }
 
 pub const REFERENCES: [&str; 4] = ["constant", "square", "sine", "levels"];
@@ -79,42 +75,49 @@ pub fn scenario(reference: Waveform, noise: f64, disturbances: usize) -> Scenari
     let fault = Waveform::Steps {
         points: vec![[101.0, 0.5], [401.0, 0.0], [1001.0, 0.5]],
     };
-    Scenario {
-        steps: 1600,
-        noise: vec![noise; 2],
-        seed: 42,
-        schedule: vec![
-            ModeInterval { from: 0.0, mode: 0 },
-            ModeInterval {
-                from: 800.0,
-                mode: 1,
-            },
-        ],
-        reference: vec![reference; 2],
-        fault: vec![fault; 2],
-        events: vec![],
-        disturbance: vec![
-            Waveform::Sine {
-                amplitude: 0.04,
-                period: core::f64::consts::TAU / 0.02,
-                phase: 0.0,
-                offset: 0.0
-            };
-            disturbances
-        ],
-    }
+    let mut scenario = Scenario::new(
+        1600,
+        vec![reference; 2],
+        Dimensions {
+            states: 2,
+            inputs: 2,
+            outputs: 2,
+            disturbances,
+        },
+    );
+    scenario.noise = vec![noise; 2];
+    scenario.seed = 42;
+    scenario.schedule = vec![
+        ModeInterval { from: 0.0, mode: 0 },
+        ModeInterval {
+            from: 800.0,
+            mode: 1,
+        },
+    ];
+    scenario.fault = vec![fault; 2];
+    scenario.disturbance = vec![
+        Waveform::Sine {
+            amplitude: 0.04,
+            period: core::f64::consts::TAU / 0.02,
+            phase: 0.0,
+            offset: 0.0
+        };
+        disturbances
+    ];
+    scenario
 }
 
 /// Gains from a linear-quadratic design, rounded by hand; an observer whose error shrinks by 80 % a sample.
 pub fn controller_design(channel: Channel, noise: f64) -> ControllerDesign {
     let plant = plant(channel);
-    let gains = |state_feedback: DMatrix<f64>, integral: DMatrix<f64>| FeedbackGains {
-        output_feedback: plain(&state_feedback), // both states are measured
-        state_feedback: plain(&state_feedback),
-        feedforward: plain(&(&integral * plant.sample_time)),
-        integral: plain(&integral),
-        previous_input: Matrix::zeros(2, 0),
-        anti_windup: Matrix::zeros(2, 2),
+    let gains = |state_feedback: DMatrix<f64>, integral: DMatrix<f64>| {
+        let mut gains = FeedbackGains::new(
+            plain(&state_feedback),
+            plain(&integral),
+            plain(&state_feedback), // both states are measured
+        );
+        gains.feedforward = plain(&(&integral * plant.sample_time));
+        gains
     };
     let decoupling = match channel {
         Channel::State => DMatrix::from_element(2, 2, 0.5),
@@ -147,13 +150,25 @@ pub fn controller_design(channel: Channel, noise: f64) -> ControllerDesign {
                 .fold(1e-3, f64::max)
         })
         .collect();
-    ControllerDesign {
-        feedback: StateFeedback {
-            tracked: vec![0, 1],
-            latency: 0,
-            resonators: vec![],
-            transfer: None,
-            modes: vec![
+    let mut estimator = Estimator::none(2);
+    estimator.method = EstimatorMethod::Reference;
+    estimator.response_length = length;
+    estimator.window = 2 * (length + 1) + 20;
+    estimator.predictors = predictors;
+    estimator.harmonics = Some(Harmonics {
+        period: core::f64::consts::TAU / 0.02,
+        count: 1,
+        memory: 3000.0,
+        initial_variance: 1e6,
+    });
+    estimator.harmonic_transfers =
+        ftc_design::harmonics::transfers(&plant, &[1.0, 1.0], core::f64::consts::TAU / 0.02, 1);
+    estimator.thresholds = thresholds;
+    estimator.largest_fault = vec![1e6; 2];
+    ControllerDesign::new(
+        StateFeedback::new(
+            vec![0, 1],
+            vec![
                 gains(
                     dmatrix![0.199, -0.827; -1.125, -0.447],
                     dmatrix![0.0, 0.528; 0.528, -0.001],
@@ -163,61 +178,33 @@ pub fn controller_design(channel: Channel, noise: f64) -> ControllerDesign {
                     dmatrix![0.528, 0.001; 0.0, 0.529],
                 ),
             ],
-        },
-        observer: Observer {
-            kind: if channel == Channel::State {
-                ObserverKind::Uio
-            } else {
-                ObserverKind::Luenberger
+        ),
+        Observer::new(
+            match channel {
+                Channel::State => ObserverKind::Uio,
+                Channel::Output => ObserverKind::Luenberger,
             },
-            note: None,
-            gains: observer_gains,
-            decoupling: vec![vec![plain(&decoupling); 2]; 2],
-            lost: Vec::new(),
-            minimum_dwell: 0,
-        },
-        estimator: Estimator {
-            method: EstimatorMethod::Reference,
-            hypotheses: None,
-            response_length: length,
-            window: 2 * (length + 1) + 20,
-            predictors,
-            adapt: false,
-            harmonics: Some(Harmonics {
-                period: core::f64::consts::TAU / 0.02,
-                count: 1,
-                memory: 3000.0,
-                initial_variance: 1e6,
-            }),
-            harmonic_transfers: ftc_design::harmonics::transfers(
-                &plant,
-                &[1.0, 1.0],
-                core::f64::consts::TAU / 0.02,
-                1,
-            ),
-            thresholds,
-            debounce: 1,
-            stuck_after: 0,
-            leverage_limit: 100.0,
-            largest_fault: vec![1e6; 2],
-        },
-        compensation: Compensation::VirtualSensor,
-    }
+            observer_gains,
+            vec![vec![plain(&decoupling); 2]; 2],
+        ),
+        estimator,
+        Compensation::VirtualSensor,
+    )
 }
 
 /// That controller with the plant it is for.
 pub fn controller(channel: Channel, noise: f64) -> ControllerParameters {
     let plant = plant(channel);
     let design = controller_design(channel, noise);
-    ControllerParameters {
-        sample_time: plant.sample_time,
-        modes: mode_models(&plant),
-        feedback: design.feedback,
-        observer: design.observer,
-        estimator: design.estimator,
-        compensation: design.compensation,
-        input_limits: vec![Limits::default(); 2],
-    }
+    let mut parameters = ControllerParameters::new(
+        plant.sample_time,
+        mode_models(&plant),
+        design.feedback,
+        design.observer,
+    );
+    parameters.estimator = design.estimator;
+    parameters.compensation = design.compensation;
+    parameters
 }
 
 /// The same controller with the state-based estimator.

@@ -3,7 +3,7 @@
 
 use ftc_design::{ControlSpec, Lyapunov};
 use ftc_plant::scaling::Scaling;
-use ftc_plant::{Dimensions, Mode, OperatingPoint, SwitchedPlant};
+use ftc_plant::{Dimensions, Mode, SwitchedPlant};
 use nalgebra::DMatrix;
 
 /// Where the paper's disturbance enters.
@@ -26,15 +26,7 @@ pub fn mode(
     e: DMatrix<f64>,
     f: DMatrix<f64>,
 ) -> Mode {
-    Mode {
-        name: String::new(),
-        operating_point: OperatingPoint::zero(a.nrows(), b.ncols(), c.nrows()),
-        a,
-        b,
-        c,
-        e,
-        f,
-    }
+    Mode::new(a, b, c).with_disturbance(e, f)
 }
 
 /// The plant of the paper's section VII-A.
@@ -58,24 +50,20 @@ pub fn paper(channel: Channel) -> SwitchedPlant {
         e,
         f,
     );
-    SwitchedPlant {
-        sample_time: 1.0,
-        modes: vec![first, second],
-    }
+    SwitchedPlant::new(1.0, vec![first, second])
 }
 
 /// The weights of the reference table: 1 on the output, 0.3 on the integral, 0.1 on the input.
 pub fn paper_spec(latency: usize, decay: f64, lyapunov: Lyapunov) -> ControlSpec {
     let dims = paper(Channel::State).dimensions();
-    ControlSpec {
-        latency,
-        decay,
-        lyapunov,
-        output_weight: vec![1.0; 2],
-        integral_weight: vec![0.3; 2],
-        input_weight: vec![0.1; 2],
-        ..ControlSpec::unweighted(dims)
-    }
+    let mut spec = ControlSpec::unweighted(dims);
+    spec.latency = latency;
+    spec.decay = decay;
+    spec.lyapunov = lyapunov;
+    spec.output_weight = vec![1.0; 2];
+    spec.integral_weight = vec![0.3; 2];
+    spec.input_weight = vec![0.1; 2];
+    spec
 }
 
 /// A linear congruential generator: reproducible anywhere, good enough for matrices.
@@ -128,7 +116,7 @@ pub fn random_plant(seed: u64, sample_time: f64) -> SwitchedPlant {
             )
         })
         .collect();
-    SwitchedPlant { sample_time, modes }
+    SwitchedPlant::new(sample_time, modes)
 }
 
 /// Three modes, two inputs, three outputs, drawn at random: a plant on which the solver used to stop on
@@ -265,10 +253,7 @@ pub fn three_modes() -> SwitchedPlant {
         ),
     ];
     let modes = modes.map(|(a, b)| mode(a, b, c.clone(), e.clone(), DMatrix::zeros(3, 1)));
-    SwitchedPlant {
-        sample_time: 0.5,
-        modes: modes.to_vec(),
-    }
+    SwitchedPlant::new(0.5, modes.to_vec())
 }
 
 /// Two first-order channels that have nothing to do with each other, the first disturbed; one mode per
@@ -286,10 +271,7 @@ pub fn two_channels(disturbances: &[f64]) -> SwitchedPlant {
             DMatrix::zeros(2, 1),
         )
     };
-    SwitchedPlant {
-        sample_time: 1.0,
-        modes: disturbances.iter().map(channel).collect(),
-    }
+    SwitchedPlant::new(1.0, disturbances.iter().map(channel).collect())
 }
 
 /// A state that drives another; the driven one is unstable in the first mode, and the disturbance acts
@@ -304,10 +286,7 @@ pub fn half_unstable() -> SwitchedPlant {
             DMatrix::zeros(2, 1),
         )
     };
-    SwitchedPlant {
-        sample_time: 0.1,
-        modes: vec![driven(1.05), driven(0.9)],
-    }
+    SwitchedPlant::new(0.1, vec![driven(1.05), driven(0.9)])
 }
 
 /// A plant of one to five states whose modes are variations of one another, some of them unstable; each
@@ -336,10 +315,7 @@ pub fn sparsely_disturbed(seed: u64) -> SwitchedPlant {
             DMatrix::zeros(p, 1),
         )
     };
-    SwitchedPlant {
-        sample_time: 0.5,
-        modes: (0..modes).map(variation).collect(),
-    }
+    SwitchedPlant::new(0.5, (0..modes).map(variation).collect())
 }
 
 /// A three-phase rectifier in amperes and volts, states (i_d, i_q, v_dc), sampled at 0.1 ms: 10 mH,
@@ -374,7 +350,7 @@ pub fn rectifier() -> SwitchedPlant {
             )
         })
         .collect();
-    SwitchedPlant { sample_time, modes }
+    SwitchedPlant::new(sample_time, modes)
 }
 
 /// A plant and a request in other units of states, inputs and outputs.
@@ -387,25 +363,22 @@ pub fn in_units(
         weights.iter().zip(units).map(|(w, u)| w * u).collect()
     };
     let tracked = || spec.tracked.iter().map(|&output| units.outputs[output]);
-    let changed = ControlSpec {
-        output_weight: over(&spec.output_weight, &mut tracked()),
-        integral_weight: over(&spec.integral_weight, &mut tracked()),
-        input_weight: over(&spec.input_weight, &mut units.inputs.iter().copied()),
-        ..spec.clone()
-    };
+    let mut changed = spec.clone();
+    changed.output_weight = over(&spec.output_weight, &mut tracked());
+    changed.integral_weight = over(&spec.integral_weight, &mut tracked());
+    changed.input_weight = over(&spec.input_weight, &mut units.inputs.iter().copied());
     (units.apply(plant), changed)
 }
 
 /// Each guarantee in turn, with the usual weights.
 pub fn usual_spec(seed: u64, dims: Dimensions) -> ControlSpec {
     let r = dims.outputs.min(dims.inputs);
-    ControlSpec {
-        decay: 0.95,
-        lyapunov: [Lyapunov::Common, Lyapunov::Switched, Lyapunov::Dwell][seed as usize % 3],
-        integral_weight: vec![0.3; r],
-        input_weight: vec![0.1; dims.inputs],
-        ..ControlSpec::unweighted(dims)
-    }
+    let mut spec = ControlSpec::unweighted(dims);
+    spec.decay = 0.95;
+    spec.lyapunov = [Lyapunov::Common, Lyapunov::Switched, Lyapunov::Dwell][seed as usize % 3];
+    spec.integral_weight = vec![0.3; r];
+    spec.input_weight = vec![0.1; dims.inputs];
+    spec
 }
 
 /// Units of all signals, evenly spread on the logarithmic scale from 1e-6 to 1e6.

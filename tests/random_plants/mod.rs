@@ -1,12 +1,12 @@
 //! Random switched plants with certified designs, for benches and property tests.
 #![allow(dead_code, missing_docs)]
 
-use ftc_control::parameters::{Compensation, EstimatorMethod};
-use ftc_design::assembly::{EstimatorSpec, KnownDisturbance, Request, assemble};
+use ftc_control::parameters::EstimatorMethod;
+use ftc_design::assembly::{KnownDisturbance, Request, assemble};
 use ftc_design::{ControlSpec, Design, Lyapunov, ObserverChoice, ObserverSpec, Signals};
 use ftc_plant::Scenario;
-use ftc_plant::scenario::{ModeInterval, Waveform};
-use ftc_plant::{Mode, OperatingPoint, SwitchedPlant, spectral_radius};
+use ftc_plant::scenario::Waveform;
+use ftc_plant::{Mode, SwitchedPlant, spectral_radius};
 use nalgebra::DMatrix;
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::{Rng, SeedableRng};
@@ -40,15 +40,13 @@ impl Dice {
 fn mode(dice: &mut Dice, n: usize, m: usize, p: usize, output: &DMatrix<f64>) -> Mode {
     let a = dice.matrix(n, n);
     let radius = spectral_radius(&a).max(1e-3);
-    Mode {
-        name: "random".into(),
-        a: a * (dice.between(0.3, 0.85) / radius),
-        b: dice.matrix(n, m),
-        c: output.clone(),
-        e: dice.matrix(n, 1) * 0.3,
-        f: DMatrix::zeros(p, 1),
-        operating_point: OperatingPoint::zero(n, m, p),
-    }
+    Mode::new(
+        a * (dice.between(0.3, 0.85) / radius),
+        dice.matrix(n, m),
+        output.clone(),
+    )
+    .named("random")
+    .with_disturbance(dice.matrix(n, 1) * 0.3, DMatrix::zeros(p, 1))
 }
 
 /// A random plant with a certified design; draws until one exists.
@@ -71,69 +69,42 @@ pub fn design_with(dice: &mut Dice, method: EstimatorMethod) -> Design {
     loop {
         let (n, m, p) = (dice.count(1, 5), dice.count(1, 3), dice.count(1, 3));
         let output = dice.matrix(p, n);
-        let plant = SwitchedPlant {
-            sample_time: dice.between(0.01, 1.0),
-            modes: (0..2).map(|_| mode(dice, n, m, p, &output)).collect(),
-        };
+        let plant = SwitchedPlant::new(
+            dice.between(0.01, 1.0),
+            (0..2).map(|_| mode(dice, n, m, p, &output)).collect(),
+        );
         let dims = plant.dimensions();
         let r = p.min(m).min(n);
-        let control = ControlSpec {
-            tracked: (0..r).collect(),
-            lyapunov: Lyapunov::Dwell,
-            decay: 0.95,
-            output_weight: vec![1.0; r],
-            integral_weight: vec![0.3 / plant.sample_time; r],
-            input_weight: vec![0.3; m],
-            ..ControlSpec::unweighted(dims)
-        };
+        let mut control = ControlSpec::unweighted(dims);
+        control.tracked = (0..r).collect();
+        control.lyapunov = Lyapunov::Dwell;
+        control.decay = 0.95;
+        control.output_weight = vec![1.0; r];
+        control.integral_weight = vec![0.3 / plant.sample_time; r];
+        control.input_weight = vec![0.3; m];
         let period = dice.between(40.0, 300.0) * plant.sample_time;
-        let scenario = Scenario {
-            steps: STEPS,
-            noise: vec![NOISE; p],
-            seed: dice.0.next_u64(),
-            schedule: vec![ModeInterval { from: 0.0, mode: 0 }],
-            reference: (0..r)
-                .map(|_| Waveform::Square {
-                    amplitude: dice.between(0.2, 0.8),
-                    period: 400.0 * plant.sample_time,
-                    offset: 0.0,
-                })
-                .collect(),
-            fault: vec![Waveform::ZERO; p],
-            events: vec![],
-            disturbance: vec![Waveform::Sine {
-                amplitude: 0.05,
-                period,
-                phase: 0.0,
-                offset: 0.0,
-            }],
-        };
-        let request = Request {
-            name: "random".into(),
-            signals: Signals::numbered(dims),
-            plant,
-            control,
-            bumpless: false,
-            feedforward: true,
-            observer: ObserverSpec {
-                kind: ObserverChoice::Auto,
-                decay: 0.9,
-                lyapunov: Lyapunov::Dwell,
-                noise: Vec::new(),
-            },
-            estimator: EstimatorSpec {
-                method,
-                disturbance: Some(KnownDisturbance {
-                    period,
-                    harmonics: 1,
-                    amplitude: Some(vec![0.05]),
-                }),
-                ..EstimatorSpec::default()
-            },
-            compensation: Compensation::VirtualSensor,
-            true_plant: ftc_plant::TruePlant::AsDesigned,
-            scenario,
-        };
+        let seed = dice.0.next_u64();
+        let reference = (0..r).map(|_| Waveform::Square {
+            amplitude: dice.between(0.2, 0.8),
+            period: 400.0 * plant.sample_time,
+            offset: 0.0,
+        });
+        let mut scenario = Scenario::new(STEPS, reference.collect(), dims);
+        scenario.noise = vec![NOISE; p];
+        scenario.seed = seed;
+        scenario.disturbance = vec![Waveform::Sine {
+            amplitude: 0.05,
+            period,
+            phase: 0.0,
+            offset: 0.0,
+        }];
+        let mut request = Request::new("random", plant, Signals::numbered(dims), scenario);
+        request.control = control;
+        request.observer = ObserverSpec::new(ObserverChoice::Auto, 0.9, Lyapunov::Dwell);
+        request.estimator.method = method;
+        let mut disturbance = KnownDisturbance::new(period);
+        disturbance.amplitude = Some(vec![0.05]);
+        request.estimator.disturbance = Some(disturbance);
         if let Ok(design) = assemble(request) {
             return design;
         }

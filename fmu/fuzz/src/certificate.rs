@@ -21,19 +21,15 @@ pub struct Forged {
 
 /// A small design with as much to prove as there is: two modes, bumpless, each sensor may be lost.
 fn sound() -> Design {
-    let mode = |pole: f64| Mode {
-        e: dmatrix![0.1; 0.05],
-        f: dmatrix![0.0; 0.0],
-        ..Mode::new(
+    let mode = |pole: f64| {
+        Mode::new(
             dmatrix![pole, 0.1; 0.0, 0.5],
             dmatrix![0.2; 1.0],
             dmatrix![1.0, 0.0; 0.0, 1.0],
         )
+        .with_disturbance(dmatrix![0.1; 0.05], dmatrix![0.0; 0.0])
     };
-    let plant = SwitchedPlant {
-        sample_time: 1.0,
-        modes: vec![mode(0.9), mode(0.8)],
-    };
+    let plant = SwitchedPlant::new(1.0, vec![mode(0.9), mode(0.8)]);
     let signals = Signals::numbered(plant.dimensions());
     let mut scenario = Scenario::new(100, vec![Waveform::ZERO], plant.dimensions());
     scenario.noise.fill(0.01);
@@ -53,7 +49,8 @@ static SOUND: LazyLock<(String, String)> = LazyLock::new(|| {
 
 /// Proves an unchanged pair once, then the forged one: whatever comes of it is an answer.
 pub fn prove_forged(forged: &Forged) {
-    static ONCE: LazyLock<()> = LazyLock::new(|| prove(&SOUND.0, &SOUND.1, false).unwrap().unwrap());
+    static ONCE: LazyLock<()> =
+        LazyLock::new(|| prove(&SOUND.0, &SOUND.1, false).unwrap().unwrap());
     LazyLock::force(&ONCE);
     let few = |edits: &[Edit]| edits[..edits.len().min(8)].to_vec();
     let design = edited_text(&SOUND.0, &few(&forged.design));

@@ -2,6 +2,11 @@
 //! linked into the program), makes instances, and closes the loop of controller and plant.
 //!
 //! It fails loudly: whatever must succeed is asserted.
+#![expect(
+    clippy::exhaustive_structs,
+    clippy::exhaustive_enums,
+    reason = "for the tests of this workspace"
+)]
 
 mod closed_loop;
 mod exercise;

@@ -95,6 +95,10 @@ fn has_length(signal: &'static str, values: &[f64], needed: usize) -> Result<(),
 
 /// The fault that is taken out of the loop.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[expect(
+    clippy::exhaustive_enums,
+    reason = "nothing, what is estimated, or what is known"
+)]
 pub enum Compensate<'a> {
     /// None: the controller believes its sensors.
     Nothing,

@@ -33,6 +33,7 @@ const NOTHING: f64 = 1e-20;
 
 /// A delay that the readings fit, other than the one designed for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[expect(clippy::exhaustive_enums, reason = "more or less")]
 pub enum Delay {
     /// One sample more.
     Longer,
@@ -82,6 +83,10 @@ crate::state!(Run {
 
 /// The commands that may act over the coming sample (m each).
 #[derive(Clone, Copy, Debug)]
+#[expect(
+    clippy::exhaustive_structs,
+    reason = "the two that latency tells apart"
+)]
 pub struct Commands<'a> {
     /// As designed.
     pub designed: &'a [f64],

@@ -1,6 +1,6 @@
 //! On line: what runs at every tick, and nothing else.
 //!
-//! A measurement enters the [`estimator`], which decides sensor by sensor whether to believe it;
+//! A measurement enters the [`estimator`], which decides sensor by sensor whether it is faulty;
 //! [`compensation`] makes the corrected measurement; the [`observer`] and the [`integrator`]
 //! turn that into the state estimate and the tracking-error integral; the [`controller`]
 //! composes them into the command.
@@ -14,29 +14,13 @@
 //! use ftc_control::{Controller, ControllerParameters, Matrix};
 //!
 //! let one = |value: f64| Matrix::from_rows(&[[value]]);
-//! let gains = FeedbackGains {
-//!     state_feedback: one(-0.4), integral: one(0.1), feedforward: Matrix::zeros(1, 0),
-//!     previous_input: Matrix::zeros(1, 0), anti_windup: one(0.0), output_feedback: one(-0.4),
-//! };
-//! let controller = Controller::new(ControllerParameters {
-//!     sample_time: 1.0,
-//!     modes: vec![ModeModel { a: one(0.9), b: one(1.0), c: one(1.0), e: Matrix::zeros(1, 0), f: Matrix::zeros(1, 0),
-//!         x0: vec![0.0], u0: vec![0.0], y0: vec![0.0] }],
-//!     feedback: StateFeedback {
-//!         tracked: vec![0], latency: 0, resonators: vec![], transfer: None, modes: vec![gains],
-//!     },
-//!     observer: Observer {
-//!         kind: ObserverKind::Luenberger, note: None, gains: vec![one(0.5)], decoupling: vec![vec![one(0.0)]],
-//!         lost: vec![], minimum_dwell: 0,
-//!     },
-//!     estimator: Estimator {
-//!         method: EstimatorMethod::None, response_length: 0, window: 0, predictors: vec![], adapt: false,
-//!         harmonics: None, harmonic_transfers: vec![], thresholds: vec![1.0], debounce: 1, stuck_after: 0,
-//!         leverage_limit: 100.0, largest_fault: vec![10.0], hypotheses: None,
-//!     },
-//!     compensation: Compensation::None,
-//!     input_limits: vec![Limits::default()],
-//! })?;
+//! let gains = FeedbackGains::new(one(-0.4), one(0.1), one(-0.4)); // K, G, K C^+
+//! let controller = Controller::new(ControllerParameters::new(
+//!     1.0, // sample time
+//!     vec![ModeModel::new(one(0.9), one(1.0), one(1.0))], // A, B, C
+//!     StateFeedback::new(vec![0], vec![gains]), // output 0 is tracked
+//!     Observer::luenberger(vec![one(0.5)]),
+//! ))?;
 //! let (mut state, mut y) = (controller.initial_state(0), 0.0);
 //! for tick in 0..100 {
 //!     let (measured, reference) = ([y], [1.0]);

@@ -39,6 +39,7 @@ crate::state!(ObserverState {
 
 /// One mode of the plant as the observer uses it: affine in physical units.
 #[derive(Clone, Debug)]
+#[non_exhaustive]
 pub struct ObservedMode {
     /// `A` (n x n)
     pub a: Matrix,

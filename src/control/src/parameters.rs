@@ -2,11 +2,13 @@
 
 use crate::matrix::{Matrix, upper_triangle};
 use alloc::string::String;
+use alloc::vec;
 use alloc::vec::Vec;
 use serde::{Deserialize, Serialize};
 
 /// A complete controller: the model it observes, its gains, its predictor, its decisions.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[non_exhaustive]
 pub struct ControllerParameters {
     /// Sample time `Te` in seconds.
     pub sample_time: f64,
@@ -24,9 +26,34 @@ pub struct ControllerParameters {
     pub input_limits: Vec<Limits>,
 }
 
+impl ControllerParameters {
+    /// A controller without fault estimator and without input limits. An estimator put in its place is
+    /// compensated by a virtual sensor.
+    pub fn new(
+        sample_time: f64,
+        modes: Vec<ModeModel>,
+        feedback: StateFeedback,
+        observer: Observer,
+    ) -> Self {
+        let (inputs, outputs) = modes
+            .first()
+            .map_or((0, 0), |mode| (mode.b.ncols(), mode.c.nrows()));
+        Self {
+            sample_time,
+            modes,
+            feedback,
+            observer,
+            estimator: Estimator::none(outputs),
+            compensation: Compensation::VirtualSensor,
+            input_limits: vec![Limits::default(); inputs],
+        }
+    }
+}
+
 /// One mode of the plant, linear about its operating point:
 /// `x(k+1) = x0 + A (x - x0) + B (u - u0) + E w`, `y = y0 + C (x - x0) + F w`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[non_exhaustive]
 pub struct ModeModel {
     /// State matrix `A` (n x n).
     pub a: Matrix,
@@ -46,8 +73,26 @@ pub struct ModeModel {
     pub y0: Vec<f64>,
 }
 
+impl ModeModel {
+    /// A mode of these `A`, `B` and `C`, about the origin, without a known disturbance.
+    pub fn new(a: Matrix, b: Matrix, c: Matrix) -> Self {
+        let (n, m, p) = (a.nrows(), b.ncols(), c.nrows());
+        Self {
+            a,
+            b,
+            c,
+            e: Matrix::zeros(n, 0),
+            f: Matrix::zeros(p, 0),
+            x0: vec![0.0; n],
+            u0: vec![0.0; m],
+            y0: vec![0.0; p],
+        }
+    }
+}
+
 /// A closed interval; an absent end is unbounded.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[expect(clippy::exhaustive_structs, reason = "an interval has two ends")]
 pub struct Limits {
     /// Lower end.
     pub min: Option<f64>,
@@ -65,6 +110,10 @@ impl Limits {
 
 /// Bumpless transfer: at a switch an offset lets the command repeat its last value.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[expect(
+    clippy::exhaustive_structs,
+    reason = "the offset's law has these two numbers"
+)]
 pub struct Transfer {
     /// Samples that must have passed since the offset was last set before a switch sets it again.
     pub samples: usize,
@@ -74,6 +123,7 @@ pub struct Transfer {
 
 /// State feedback with integral action, one gain set per mode (20).
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[non_exhaustive]
 pub struct StateFeedback {
     /// Which outputs follow the reference (0-based rows of `C`), `r` of them.
     pub tracked: Vec<usize>,
@@ -90,6 +140,17 @@ pub struct StateFeedback {
 }
 
 impl StateFeedback {
+    /// The gains of each mode for these tracked outputs, without latency, resonators and bumpless transfer.
+    pub fn new(tracked: Vec<usize>, modes: Vec<FeedbackGains>) -> Self {
+        Self {
+            tracked,
+            latency: 0,
+            resonators: Vec::new(),
+            transfer: None,
+            modes,
+        }
+    }
+
     /// Size `q` of the integral part: one integrator per tracked output, and two states per
     /// tracked output and resonator.
     pub fn integral_size(&self) -> usize {
@@ -104,6 +165,7 @@ impl StateFeedback {
 
 /// The gains of one mode: `u = u0 + K (x - x0) + G Z + N (y_ref - S y0) + V (u_prev - u0)`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[non_exhaustive]
 pub struct FeedbackGains {
     /// `K_i` (m x n).
     pub state_feedback: Matrix,
@@ -120,9 +182,28 @@ pub struct FeedbackGains {
     pub output_feedback: Matrix,
 }
 
+impl FeedbackGains {
+    /// `K` (m x n), `G` (m x q) and `K C^+` (m x p): no feedforward, no latency, no anti-windup.
+    pub fn new(state_feedback: Matrix, integral: Matrix, output_feedback: Matrix) -> Self {
+        let (m, q) = integral.shape();
+        Self {
+            state_feedback,
+            integral,
+            feedforward: Matrix::zeros(m, 0),
+            previous_input: Matrix::zeros(m, 0),
+            anti_windup: Matrix::zeros(q, m),
+            output_feedback,
+        }
+    }
+}
+
 /// Which observer was designed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
+#[expect(
+    clippy::exhaustive_enums,
+    reason = "a new kind must be proved and reported: the compiler says where"
+)]
 pub enum ObserverKind {
     /// Unknown input observer: the disturbance is decoupled from the estimate.
     Uio,
@@ -134,6 +215,7 @@ pub enum ObserverKind {
 
 /// The observer (11), per mode and per pair of modes.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[non_exhaustive]
 pub struct Observer {
     /// Its kind.
     pub kind: ObserverKind,
@@ -143,7 +225,7 @@ pub struct Observer {
     pub gains: Vec<Matrix>,
     /// `H_ij` of (14): `decoupling[i][j]` corrects on entering mode `j` from mode `i` (n x p each).
     pub decoupling: Vec<Vec<Matrix>>,
-    /// Matrixs for each set of lost sensors from whose rest the state can be observed, the smallest
+    /// Matrices for each set of lost sensors from whose rest the state can be observed, the smallest
     /// sets first; a set that is not listed is not served. With none lost, the gains above are used.
     #[serde(default)]
     pub lost: Vec<LostSet>,
@@ -153,8 +235,32 @@ pub struct Observer {
     pub minimum_dwell: usize,
 }
 
+impl Observer {
+    /// An observer of this kind with its `K_i*` and `H_ij`, which serves no set of lost sensors.
+    pub fn new(kind: ObserverKind, gains: Vec<Matrix>, decoupling: Vec<Vec<Matrix>>) -> Self {
+        Self {
+            kind,
+            note: None,
+            gains,
+            decoupling,
+            lost: Vec::new(),
+            minimum_dwell: 0,
+        }
+    }
+
+    /// A Luenberger observer with these gains: nothing is decoupled, every `H_ij` is zero.
+    pub fn luenberger(gains: Vec<Matrix>) -> Self {
+        let zeros = gains
+            .iter()
+            .map(|gain| Matrix::zeros(gain.nrows(), gain.ncols()));
+        let decoupling = vec![zeros.collect(); gains.len()];
+        Self::new(ObserverKind::Luenberger, gains, decoupling)
+    }
+}
+
 /// How to observe without some sensors: `x_hat = prior + H (y - C prior)`, no injection.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[non_exhaustive]
 pub struct LostSet {
     /// Which sensors (rows of `C`, from 0) are lost, in ascending order; never empty.
     pub sensors: Vec<usize>,
@@ -162,9 +268,23 @@ pub struct LostSet {
     pub correction: Vec<Matrix>,
 }
 
+impl LostSet {
+    /// With these sensors lost, ascending, the `H` of each mode.
+    pub fn new(sensors: Vec<usize>, correction: Vec<Matrix>) -> Self {
+        Self {
+            sensors,
+            correction,
+        }
+    }
+}
+
 /// How faults are estimated.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
+#[expect(
+    clippy::exhaustive_enums,
+    reason = "a new method must be designed and reported: the compiler says where"
+)]
 pub enum EstimatorMethod {
     /// State-based: hypotheses about sensors and plant in competition.
     Observer,
@@ -178,6 +298,7 @@ pub enum EstimatorMethod {
 
 /// The data-based projection estimator (41)-(62).
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[non_exhaustive]
 pub struct Estimator {
     /// Method.
     pub method: EstimatorMethod,
@@ -203,7 +324,7 @@ pub struct Estimator {
     /// Consecutive samples needed to raise or release a fault.
     pub debounce: u32,
     /// Repetitions of the very same reading after which a sensor is taken for frozen, and then as
-    /// if it were silent; 0: never.
+    /// if it gave no reading; 0: never.
     pub stuck_after: u32,
     /// Above this leverage the input lies outside what the database spans, and no decision is taken.
     pub leverage_limit: f64,
@@ -211,7 +332,30 @@ pub struct Estimator {
     pub largest_fault: Vec<f64>,
 }
 
+/// Leverage beyond which a residual is not used, where nothing else is asked for.
+pub const LEVERAGE_LIMIT: f64 = 100.0;
+
 impl Estimator {
+    /// No estimation, for so many sensors. Before choosing a method, set what it needs: its predictors or
+    /// hypotheses and the thresholds, which no residual exceeds here.
+    pub fn none(outputs: usize) -> Self {
+        Self {
+            method: EstimatorMethod::None,
+            hypotheses: None,
+            response_length: 0,
+            window: 0,
+            predictors: Vec::new(),
+            adapt: false,
+            harmonics: None,
+            harmonic_transfers: Vec::new(),
+            thresholds: vec![f64::MAX; outputs],
+            debounce: 1,
+            stuck_after: 0,
+            leverage_limit: LEVERAGE_LIMIT,
+            largest_fault: vec![f64::MAX; outputs],
+        }
+    }
+
     /// Whether the mode is found from the readings.
     pub fn finds_the_mode(&self) -> bool {
         let settings = self.hypotheses.as_ref().map(|found| found.mode_rate);
@@ -228,15 +372,20 @@ impl Estimator {
 /// What is done about a divergence that could be a sensor's drift or a load.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
+#[expect(clippy::exhaustive_enums, reason = "one of two is used")]
 pub enum Ambiguous {
-    /// The sensors are believed, and the alarm is up.
+    /// The readings are used, and the alarm is up.
     TrustSensors,
-    /// The model is believed: the sensor is corrected.
+    /// The model is used: the sensor is corrected.
     TrustModel,
 }
 
 /// Sizes and rates of what may happen to sensors and plant, for [`EstimatorMethod::Observer`].
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[expect(
+    clippy::exhaustive_structs,
+    reason = "whoever makes these must choose each number: the compiler names a new one"
+)]
 pub struct Hypotheses {
     /// Standard deviation of the noise of each sensor (p), output units.
     pub noise: Vec<f64>,
@@ -255,7 +404,7 @@ pub struct Hypotheses {
     /// Switches per sample where the mode is found from the readings; none where it is told.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub mode_rate: Option<f64>,
-    /// Log odds that an accusation must have against the best explanation without one.
+    /// Log odds that a sensor's fault must have against the best explanation without one.
     pub odds: f64,
     /// Standard deviation of a new fault (p), output units.
     pub fault_size: Vec<f64>,
@@ -302,6 +451,7 @@ pub struct Hypotheses {
 
 /// A mode's matrices as logs of healthy operation have them, about the plant's operating point.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[non_exhaustive]
 pub struct FittedMode {
     /// `A` (n x n).
     pub a: Matrix,
@@ -313,6 +463,19 @@ pub struct FittedMode {
     pub fit_of_model: Vec<f64>,
 }
 
+impl FittedMode {
+    /// These matrices, and how much of the log held back they (`fit`) and the plant's own (`fit_of_model`)
+    /// explain, in percent per output.
+    pub fn new(a: Matrix, b: Matrix, fit: Vec<f64>, fit_of_model: Vec<f64>) -> Self {
+        Self {
+            a,
+            b,
+            fit,
+            fit_of_model,
+        }
+    }
+}
+
 impl Hypotheses {
     /// Whether a slow divergence is taken for a sensor's fault.
     pub fn trusts_model(&self) -> bool {
@@ -322,6 +485,10 @@ impl Hypotheses {
 
 /// `y ~ y0 + response * phi`, with `phi` the last `j` inputs relative to `u0`, oldest first.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[expect(
+    clippy::exhaustive_structs,
+    reason = "a least-squares solution and what it rests on"
+)]
 pub struct Predictor {
     /// `Y1 U1^+` (p x m j).
     pub response: Matrix,
@@ -336,6 +503,10 @@ pub struct Predictor {
 
 /// What is known of the periodic disturbance.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[expect(
+    clippy::exhaustive_structs,
+    reason = "the parameters of the recursive least squares"
+)]
 pub struct Harmonics {
     /// Period in samples (need not be whole).
     pub period: f64,
@@ -349,6 +520,7 @@ pub struct Harmonics {
 
 /// A complex matrix that turns the outputs' phasors in one mode into those in another (p x p).
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[expect(clippy::exhaustive_structs, reason = "a complex matrix")]
 pub struct PhasorMap {
     /// Real part.
     pub real: Matrix,
@@ -359,6 +531,10 @@ pub struct PhasorMap {
 /// How the estimated fault is compensated.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
+#[expect(
+    clippy::exhaustive_enums,
+    reason = "a new one must be run and reported: the compiler says where"
+)]
 pub enum Compensation {
     /// Observer and integrator see the corrected measurement.
     VirtualSensor,

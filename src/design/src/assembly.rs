@@ -10,7 +10,7 @@ use super::{
     ObserverSpec, RequestError, Run, Signal, Signals, check_controllable, synthesise_with,
 };
 use crate::coverage;
-use crate::derived::{LEVERAGE_LIMIT, feedback, largest_faults, sensor_noise};
+use crate::derived::{feedback, largest_faults, sensor_noise};
 use crate::work::Work;
 use ftc_control::parameters::{
     Compensation, Estimator, EstimatorMethod, Harmonics, Limits, Predictor,
@@ -20,6 +20,7 @@ use ftc_plant::{Scenario, TruePlant};
 
 /// A design that is asked for.
 #[derive(Clone, Debug)]
+#[non_exhaustive]
 pub struct Request {
     /// Name of the design.
     pub name: String,
@@ -69,6 +70,7 @@ impl Request {
 
 /// The fault estimator that is asked for.
 #[derive(Clone, Debug, PartialEq)]
+#[non_exhaustive]
 pub struct EstimatorSpec {
     /// Method.
     pub method: EstimatorMethod,
@@ -108,6 +110,7 @@ impl Default for EstimatorSpec {
 
 /// Where the healthy database comes from.
 #[derive(Clone, Debug, PartialEq)]
+#[non_exhaustive]
 pub enum DatabaseSource {
     /// A commissioning run on the plant model.
     Commission,
@@ -119,6 +122,7 @@ pub enum DatabaseSource {
 
 /// How thresholds are chosen.
 #[derive(Clone, Debug, PartialEq)]
+#[non_exhaustive]
 pub enum Threshold {
     /// One per sensor (p), in output units.
     Given(Vec<f64>),
@@ -295,21 +299,20 @@ fn estimator(request: &Request, dims: Dimensions) -> Result<Estimator, RequestEr
         settings.fitted = fits.into_iter().map(|fit| fit.mode).collect();
         settings
     });
-    Ok(Estimator {
-        method: spec.method,
-        hypotheses,
-        response_length,
-        window: dims.inputs * (response_length + 1) + WINDOW_MARGIN,
-        predictors,
-        adapt: spec.adapt,
-        harmonics,
-        harmonic_transfers,
-        thresholds,
-        debounce: spec.debounce,
-        stuck_after: spec.stuck_after,
-        leverage_limit: LEVERAGE_LIMIT,
-        largest_fault: largest_faults(outputs),
-    })
+    let mut estimator = Estimator::none(outputs.len());
+    estimator.method = spec.method;
+    estimator.hypotheses = hypotheses;
+    estimator.response_length = response_length;
+    estimator.window = dims.inputs * (response_length + 1) + WINDOW_MARGIN;
+    estimator.predictors = predictors;
+    estimator.adapt = spec.adapt;
+    estimator.harmonics = harmonics;
+    estimator.harmonic_transfers = harmonic_transfers;
+    estimator.thresholds = thresholds;
+    estimator.debounce = spec.debounce;
+    estimator.stuck_after = spec.stuck_after;
+    estimator.largest_fault = largest_faults(outputs);
+    Ok(estimator)
 }
 
 /// The response length asked for, or the one after which the response has decayed.

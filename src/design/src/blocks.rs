@@ -6,6 +6,7 @@ use std::fmt;
 /// What an inequality demands.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
+#[non_exhaustive]
 pub enum BlockKind {
     /// The closed loop's state shrinks by the decay rate each sample.
     Decay,

@@ -41,6 +41,7 @@ pub struct FactoredLyapunov {
 /// A Lyapunov matrix `P` of the function `e' P e`, in the certificate's units.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(transparent)]
+#[expect(clippy::exhaustive_structs, reason = "a matrix, named")]
 pub struct LyapunovMatrix(
     /// Symmetric, positive definite (n x n).
     #[serde(with = "rows")]
@@ -49,6 +50,7 @@ pub struct LyapunovMatrix(
 
 /// What, beside the plant and the gains, it takes to prove a state feedback.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[non_exhaustive]
 pub struct ControlCertificate {
     /// Units (powers of two) in which the inequalities are stated.
     pub units: Units,

@@ -371,7 +371,6 @@ pub fn model_predictor(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use ftc_plant::OperatingPoint;
     use proptest::prelude::*;
 
     fn stable_mode(entries: &[f64]) -> Mode {
@@ -380,15 +379,7 @@ mod tests {
         let mut matrix = |r, c| DMatrix::from_fn(r, c, |_, _| at.next().unwrap_or(0.5));
         let a = matrix(n, n);
         let radius = spectral_radius(&a).max(0.1);
-        Mode {
-            name: "random".into(),
-            a: a * (0.6 / radius),
-            b: matrix(n, m),
-            c: matrix(p, n),
-            e: DMatrix::zeros(n, 0),
-            f: DMatrix::zeros(p, 0),
-            operating_point: OperatingPoint::zero(n, m, p),
-        }
+        Mode::new(a * (0.6 / radius), matrix(n, m), matrix(p, n)).named("random")
     }
 
     proptest! {

@@ -13,7 +13,9 @@ use crate::{
     CertificateError, Design, HypothesesSpec, ObserverDesign, RecordError, StateFeedback, Synthesis,
 };
 use ftc_control::Matrix;
-use ftc_control::parameters::{Estimator, EstimatorMethod, FeedbackGains, ObserverKind, Predictor};
+use ftc_control::parameters::{
+    Estimator, EstimatorMethod, FeedbackGains, LEVERAGE_LIMIT, ObserverKind, Predictor,
+};
 use ftc_plant::scaling::Scaling;
 use nalgebra::DMatrix;
 
@@ -262,7 +264,7 @@ fn check_estimator(design: &Design) -> Result<(), CoverageError> {
     all(&[
         (estimator.thresholds.iter().all(threshold), "a threshold"),
         (
-            estimator.leverage_limit == derived::LEVERAGE_LIMIT,
+            estimator.leverage_limit == LEVERAGE_LIMIT,
             "the limit of the leverage",
         ),
         (

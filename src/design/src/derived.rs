@@ -14,9 +14,6 @@ const SMALLEST_NOISE: f64 = 0.05;
 /// How many noise deviations a threshold usually is.
 const USUAL_SIGMAS: f64 = 6.0;
 
-/// Leverage beyond which the residual is not trusted.
-pub(crate) const LEVERAGE_LIMIT: f64 = 100.0;
-
 /// Share of what saturation took off that unwinds the integrator in one sample.
 const UNWINDING: f64 = 0.5;
 

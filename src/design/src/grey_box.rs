@@ -125,12 +125,12 @@ pub(crate) fn fit(
     }
     let (a, b) = grey.matrices(&theta);
     Ok(Fit {
-        mode: FittedMode {
-            a: plain(&a),
-            b: plain(&b),
-            fit: grey.percent(&judges, &theta),
-            fit_of_model: grey.percent(&judges, &model),
-        },
+        mode: FittedMode::new(
+            plain(&a),
+            plain(&b),
+            grey.percent(&judges, &theta),
+            grey.percent(&judges, &model),
+        ),
         deviation: grey.unexplained(&judges, &theta).as_slice().to_vec(),
         model_error: left.max(LEAST_ERROR.min(model_error)),
     })
@@ -431,18 +431,18 @@ impl GreyBox<'_> {
 mod tests {
     use super::*;
     use crate::commissioning::commission;
-    use ftc_plant::OperatingPoint;
 
     fn mode() -> Mode {
-        Mode {
-            name: "one".into(),
-            a: DMatrix::from_row_slice(2, 2, &[0.8, 0.1, -0.2, 0.6]),
-            b: DMatrix::from_row_slice(2, 1, &[0.5, 0.3]),
-            c: DMatrix::from_row_slice(1, 2, &[1.0, 0.5]),
-            e: DMatrix::from_row_slice(2, 1, &[0.2, 0.1]),
-            f: DMatrix::zeros(1, 1),
-            operating_point: OperatingPoint::zero(2, 1, 1),
-        }
+        Mode::new(
+            DMatrix::from_row_slice(2, 2, &[0.8, 0.1, -0.2, 0.6]),
+            DMatrix::from_row_slice(2, 1, &[0.5, 0.3]),
+            DMatrix::from_row_slice(1, 2, &[1.0, 0.5]),
+        )
+        .named("one")
+        .with_disturbance(
+            DMatrix::from_row_slice(2, 1, &[0.2, 0.1]),
+            DMatrix::zeros(1, 1),
+        )
     }
 
     fn scaling() -> Scaling {

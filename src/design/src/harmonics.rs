@@ -14,6 +14,7 @@ use nalgebra::{Complex, DMatrix, DVector};
 
 /// What is known of the periodic disturbance.
 #[derive(Clone, Debug, PartialEq)]
+#[non_exhaustive]
 pub struct KnownDisturbance {
     /// Period in seconds.
     pub period: f64,
@@ -154,28 +155,17 @@ fn response(mode: &Mode, theta: f64) -> Option<DMatrix<Complex<f64>>> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use ftc_plant::OperatingPoint;
 
     fn first_order(pole: f64, gain: f64) -> Mode {
         let scalar = |v| DMatrix::from_element(1, 1, v);
-        Mode {
-            name: String::new(),
-            a: scalar(pole),
-            b: scalar(1.0),
-            c: scalar(1.0),
-            e: scalar(gain),
-            f: scalar(0.0),
-            operating_point: OperatingPoint::zero(1, 1, 1),
-        }
+        Mode::new(scalar(pole), scalar(1.0), scalar(1.0))
+            .with_disturbance(scalar(gain), scalar(0.0))
     }
 
     /// Simulated steady responses of two modes to the same sine are related by the map.
     #[test]
     fn maps_a_simulated_response_to_that_of_the_other_mode() {
-        let plant = SwitchedPlant {
-            sample_time: 1.0,
-            modes: vec![first_order(0.8, 1.0), first_order(-0.3, 2.0)],
-        };
+        let plant = SwitchedPlant::new(1.0, vec![first_order(0.8, 1.0), first_order(-0.3, 2.0)]);
         let (period, ticks) = (20.0, 400);
         let phasor = |mode: &Mode| {
             let (mut x, mut sine, mut cosine) = (0.0, 0.0, 0.0);
@@ -201,18 +191,12 @@ mod tests {
 
     #[test]
     fn a_plant_without_disturbance_has_no_maps() {
-        let plant = SwitchedPlant {
-            sample_time: 1.0,
-            modes: vec![first_order(0.8, 0.0)],
-        };
+        let plant = SwitchedPlant::new(1.0, vec![first_order(0.8, 0.0)]);
         assert!(transfers(&plant, &[1.0], 20.0, 1).is_empty());
     }
 
     fn lag() -> SwitchedPlant {
-        SwitchedPlant {
-            sample_time: 1.0,
-            modes: vec![first_order(0.8, 1.0)],
-        }
+        SwitchedPlant::new(1.0, vec![first_order(0.8, 1.0)])
     }
 
     #[test]

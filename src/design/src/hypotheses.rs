@@ -7,6 +7,7 @@ use ftc_plant::{Mode, Scenario, SwitchedPlant};
 
 /// What may be asked of the state-based estimator; the rest follows from the design.
 #[derive(Clone, Debug, PartialEq)]
+#[non_exhaustive]
 pub struct HypothesesSpec {
     /// Relative error of the entries of the plant's matrices.
     pub model_error: f64,

@@ -12,14 +12,14 @@
 //! use ftc_plant::{Mode, SwitchedPlant, scaling::Scaling};
 //! use nalgebra::dmatrix;
 //!
-//! let mode = |pole: f64| Mode {
-//!     e: dmatrix![0.1; 0.0],
-//!     f: dmatrix![0.0],
-//!     ..Mode::new(dmatrix![pole, 0.1; 0.0, 0.5], dmatrix![0.0; 1.0], dmatrix![1.0, 0.0])
+//! let mode = |pole: f64| {
+//!     Mode::new(dmatrix![pole, 0.1; 0.0, 0.5], dmatrix![0.0; 1.0], dmatrix![1.0, 0.0])
+//!         .with_disturbance(dmatrix![0.1; 0.0], dmatrix![0.0])
 //! };
-//! let plant = SwitchedPlant { sample_time: 1.0, modes: vec![mode(0.9), mode(0.8)] };
+//! let plant = SwitchedPlant::new(1.0, vec![mode(0.9), mode(0.8)]);
 //! let scaling = Scaling::automatic(&plant);
-//! let spec = ControlSpec { decay: 0.98, ..ControlSpec::new(&scaling) };
+//! let mut spec = ControlSpec::new(&scaling);
+//! spec.decay = 0.98;
 //! let control = state_feedback::synthesise(&plant, &spec, &scaling)?;
 //! control.verify(&plant)?; // from the very doubles, without the solver
 //! assert!(control.spectral_radius.iter().all(|&radius| radius < 0.98));

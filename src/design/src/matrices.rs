@@ -21,15 +21,14 @@ pub fn dense(matrix: &Matrix) -> DMatrix<f64> {
 
 /// The modes of a plant as the on-line controller holds them.
 pub fn mode_models(plant: &SwitchedPlant) -> Vec<ModeModel> {
-    let modes = plant.modes.iter().map(|mode| ModeModel {
-        a: plain(&mode.a),
-        b: plain(&mode.b),
-        c: plain(&mode.c),
-        e: plain(&mode.e),
-        f: plain(&mode.f),
-        x0: mode.operating_point.x.clone(),
-        u0: mode.operating_point.u.clone(),
-        y0: mode.operating_point.y.clone(),
+    let modes = plant.modes.iter().map(|mode| {
+        let mut model = ModeModel::new(plain(&mode.a), plain(&mode.b), plain(&mode.c));
+        model.e = plain(&mode.e);
+        model.f = plain(&mode.f);
+        model.x0.clone_from(&mode.operating_point.x);
+        model.u0.clone_from(&mode.operating_point.u);
+        model.y0.clone_from(&mode.operating_point.y);
+        model
     });
     modes.collect()
 }

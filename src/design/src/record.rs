@@ -55,6 +55,7 @@ impl Signal {
 
 /// What of a controller is neither the plant's nor the signals'.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[non_exhaustive]
 pub struct ControllerDesign {
     /// State feedback with integral action.
     pub feedback: StateFeedback,
@@ -68,6 +69,7 @@ pub struct ControllerDesign {
 
 /// Descriptions of the plant's signals.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[non_exhaustive]
 pub struct Signals {
     /// Inputs (m).
     pub inputs: Vec<Signal>,
@@ -80,7 +82,34 @@ pub struct Signals {
     pub disturbances: Vec<Signal>,
 }
 
+impl ControllerDesign {
+    /// A controller of these parts.
+    pub fn new(
+        feedback: StateFeedback,
+        observer: Observer,
+        estimator: Estimator,
+        compensation: Compensation,
+    ) -> Self {
+        Self {
+            feedback,
+            observer,
+            estimator,
+            compensation,
+        }
+    }
+}
+
 impl Signals {
+    /// These inputs, outputs and states; disturbances are not described.
+    pub fn new(inputs: Vec<Signal>, outputs: Vec<Signal>, states: Vec<Signal>) -> Self {
+        Self {
+            inputs,
+            outputs,
+            states,
+            disturbances: Vec::new(),
+        }
+    }
+
     /// `u[1]`, `y[1]`, `x[1]` and so on, each as [`Signal::new`]; disturbances are not described.
     pub fn numbered(dims: Dimensions) -> Self {
         let numbered = |letter: &str, count: usize| {
@@ -119,6 +148,7 @@ impl Signals {
 
 /// One signal.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[non_exhaustive]
 pub struct Signal {
     /// Name, such as `u[1]` or the user's own.
     pub name: String,
@@ -201,15 +231,16 @@ impl Design {
     /// The data of the on-line controller.
     pub fn parameters(&self) -> ControllerParameters {
         let controller = self.controller.clone();
-        ControllerParameters {
-            sample_time: self.plant.sample_time,
-            modes: mode_models(&self.plant),
-            feedback: controller.feedback,
-            observer: controller.observer,
-            estimator: controller.estimator,
-            compensation: controller.compensation,
-            input_limits: self.signals.input_limits(),
-        }
+        let mut parameters = ControllerParameters::new(
+            self.plant.sample_time,
+            mode_models(&self.plant),
+            controller.feedback,
+            controller.observer,
+        );
+        parameters.estimator = controller.estimator;
+        parameters.compensation = controller.compensation;
+        parameters.input_limits = self.signals.input_limits();
+        parameters
     }
 
     /// Whether every part fits the plant, so that nothing on line meets a wrong size.

@@ -4,6 +4,7 @@ use std::fmt;
 
 /// Which solver finds gains. Whatever it returns is certified.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum Solver {
     /// The interior-point method that uses the structure of (T1) and (T2); the general one where
     /// that falls short.
@@ -15,6 +16,7 @@ pub enum Solver {
 
 /// How far a synthesis has come.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum Step {
     /// An iteration of the interior-point method.
     Iteration {
@@ -54,6 +56,7 @@ impl fmt::Display for Step {
 
 /// How a synthesis is run.
 #[derive(Clone, Copy)]
+#[non_exhaustive]
 pub struct Run<'a> {
     /// The solver.
     pub solver: Solver,

@@ -8,6 +8,7 @@ use serde::{Deserialize, Serialize};
 
 /// The state feedback that is asked for.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[non_exhaustive]
 pub struct ControlSpec {
     /// Indices (from 0) of the `r` outputs that follow a reference.
     pub tracked: Vec<usize>,
@@ -118,6 +119,7 @@ pub enum SpecError {
 /// What the gains are chosen for.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
+#[expect(clippy::exhaustive_enums, reason = "Theorems T1 and T2")]
 pub enum Objective {
     /// The least l2 gain `gamma` from the disturbance to the performance signal (T2).
     #[default]
@@ -267,6 +269,10 @@ fn check_decay(name: &'static str, decay: f64, lyapunov: Lyapunov) -> Result<(),
 /// Which observer is wanted.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
+#[expect(
+    clippy::exhaustive_enums,
+    reason = "a new kind must be designed and read: the compiler says where"
+)]
 pub enum ObserverChoice {
     /// The one that serves the running loop best: a Kalman filter, or the unknown input observer where
     /// it exists and the command is quieter with it.
@@ -282,6 +288,7 @@ pub enum ObserverChoice {
 
 /// The observer that is asked for.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[non_exhaustive]
 pub struct ObserverSpec {
     /// Which kind.
     pub kind: ObserverChoice,
@@ -296,6 +303,16 @@ pub struct ObserverSpec {
 }
 
 impl ObserverSpec {
+    /// An observer of this kind, decay and guarantee for noises in proportion to the nominal values.
+    pub fn new(kind: ObserverChoice, decay: f64, lyapunov: Lyapunov) -> Self {
+        Self {
+            kind,
+            decay,
+            lyapunov,
+            noise: Vec::new(),
+        }
+    }
+
     /// The defaults beside a controller of this decay and guarantee: the kind that serves the loop best, a
     /// decay as fast as the controller's.
     pub fn beside(control: &ControlSpec) -> Self {

@@ -26,7 +26,6 @@ pub(crate) use proof::scaled_gain;
 use super::certificate::{CertificateError, ControlCertificate};
 use super::matrices::{plain, pseudo_inverse_in};
 use super::{ControlSpec, DwellTime};
-use ftc_control::Matrix;
 use ftc_control::parameters::{self, FeedbackGains};
 use ftc_plant::SwitchedPlant;
 use ftc_plant::rows;
@@ -51,6 +50,7 @@ pub struct ModeGains {
 
 /// A certified state feedback.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[non_exhaustive]
 pub struct StateFeedback {
     /// What was asked for.
     pub spec: ControlSpec,
@@ -104,28 +104,26 @@ impl StateFeedback {
         let units = &self.certificate.units;
         let integrals = units.integral_part(&self.spec);
         let modes = self.modes.iter().zip(&plant.modes);
-        let modes = modes.map(|(gains, mode)| FeedbackGains {
-            state_feedback: plain(&gains.state_feedback),
-            integral: plain(&gains.integral),
-            feedforward: Matrix::zeros(gains.integral.nrows(), 0),
-            previous_input: plain(&gains.previous_input),
-            anti_windup: plain(&pseudo_inverse_in(
+        let modes = modes.map(|(gains, mode)| {
+            let inverse = pseudo_inverse_in(&mode.c, &units.outputs, &units.states, 1e-12);
+            let mut running = FeedbackGains::new(
+                plain(&gains.state_feedback),
+                plain(&gains.integral),
+                plain(&(&gains.state_feedback * inverse)),
+            );
+            running.previous_input = plain(&gains.previous_input);
+            running.anti_windup = plain(&pseudo_inverse_in(
                 &gains.integral,
                 &units.inputs,
                 &integrals,
                 1e-12,
-            )),
-            output_feedback: plain(
-                &(&gains.state_feedback
-                    * pseudo_inverse_in(&mode.c, &units.outputs, &units.states, 1e-12)),
-            ),
+            ));
+            running
         });
-        parameters::StateFeedback {
-            tracked: self.spec.tracked.clone(),
-            latency: self.spec.latency,
-            resonators: self.spec.resonators.clone(),
-            transfer: None,
-            modes: modes.collect(),
-        }
+        let mut feedback =
+            parameters::StateFeedback::new(self.spec.tracked.clone(), modes.collect());
+        feedback.latency = self.spec.latency;
+        feedback.resonators.clone_from(&self.spec.resonators);
+        feedback
     }
 }

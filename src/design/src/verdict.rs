@@ -23,6 +23,7 @@ pub struct ConflictingBlock {
 /// A change of the design that was tried, all the way to certified gains, and works.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
+#[non_exhaustive]
 pub enum Advice {
     /// Ask for a slower decay.
     Decay(f64),
@@ -164,6 +165,7 @@ fn join(advice: &[Advice]) -> String {
 
 /// The solver came back with nothing that could be a solution.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
 pub enum SolverFailure {
     /// It claims that no point satisfies the inequalities.
     #[error("it found the inequalities contradictory")]

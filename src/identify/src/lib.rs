@@ -40,6 +40,7 @@ use subspace::Model;
 /// A log of healthy operation at a fixed sample time. Row `k` holds the inputs that act from sample
 /// `k` on, and the outputs measured at it.
 #[derive(Clone, Debug)]
+#[non_exhaustive]
 pub struct Log {
     /// Inputs (samples x m), physical units.
     pub inputs: DMatrix<f64>,
@@ -59,10 +60,16 @@ impl Log {
             modes,
         }
     }
+
+    /// The same log with the active mode of each sample (0-based).
+    pub fn in_modes(self, modes: Vec<usize>) -> Self {
+        Self { modes, ..self }
+    }
 }
 
 /// What is asked for.
 #[derive(Clone, Debug)]
+#[non_exhaustive]
 pub struct Settings {
     /// Number of states; chosen by the fit on validation data when absent.
     pub order: Option<usize>,
@@ -110,6 +117,10 @@ pub struct IdentifiedMode {
 
 /// How the modes' states were made one state.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[expect(
+    clippy::exhaustive_enums,
+    reason = "a new way must be reported: the compiler says where"
+)]
 pub enum Coordinates {
     /// There is one mode only.
     Single,

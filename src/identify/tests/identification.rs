@@ -77,11 +77,7 @@ impl Plant {
         }
         let clean = self.run(&inputs, &modes);
         let noisy = clean.map(|value| value + noise * normal(random));
-        Log {
-            inputs,
-            outputs: noisy,
-            modes,
-        }
+        Log::new(inputs, noisy).in_modes(modes)
     }
 }
 
@@ -223,10 +219,8 @@ fn an_order_that_is_asked_for_is_kept() {
     let mut random = ChaCha8Rng::seed_from_u64(4);
     let plant = Plant::random(&mut random, 3, 1, 1, 1);
     let log = plant.log(&mut random, vec![0; 2000], 0.01);
-    let settings = Settings {
-        order: Some(2),
-        ..Settings::default()
-    };
+    let mut settings = Settings::default();
+    settings.order = Some(2);
     let found = identify(&[log], &settings).unwrap();
     assert_eq!((found.order, found.modes[0].a.nrows()), (2, 2));
     assert_eq!(found.coordinates, Coordinates::Single);
@@ -248,10 +242,8 @@ fn a_periodic_disturbance_is_told_from_the_plant() {
         let w = 2.0 * (std::f64::consts::TAU * k as f64 / PERIOD).sin();
         x = a * x + DVector::from_element(2, w);
     }
-    let settings = Settings {
-        periods: vec![PERIOD],
-        ..Settings::default()
-    };
+    let mut settings = Settings::default();
+    settings.periods = vec![PERIOD];
     let found = identify(&[log.clone()], &settings).unwrap();
     assert_eq!(found.order, 2, "{:?}", found.tried);
     let error = response_error(&plant, &found);
@@ -269,10 +261,8 @@ fn a_periodic_disturbance_is_told_from_the_plant() {
     );
     let blind = identify(&[log.clone()], &Settings::default()).unwrap();
     assert!(blind.order > 2, "{:?}", blind.tried);
-    let wrong = Settings {
-        periods: vec![1.5],
-        ..Settings::default()
-    };
+    let mut wrong = Settings::default();
+    wrong.periods = vec![1.5];
     assert_eq!(identify(&[log], &wrong).unwrap_err(), Error::Period(1.5));
 }
 
@@ -284,11 +274,7 @@ fn an_integrator_is_found() {
     for k in 0..599 {
         outputs[(k + 1, 0)] = outputs[(k, 0)] + 0.3 * inputs[(k, 0)];
     }
-    let log = Log {
-        inputs,
-        outputs,
-        modes: vec![0; 600],
-    };
+    let log = Log::new(inputs, outputs).in_modes(vec![0; 600]);
     let found = identify(&[log], &Settings::default()).unwrap();
     assert!(
         (found.modes[0].a[(0, 0)] - 1.0).abs() < 1e-6,
@@ -299,10 +285,12 @@ fn an_integrator_is_found() {
 
 #[test]
 fn what_a_log_lacks_is_said() {
-    let log = |rows: usize, moving: bool| Log {
-        inputs: DMatrix::from_fn(rows, 1, |k, _| if moving { (k % 7) as f64 } else { 1.0 }),
-        outputs: DMatrix::from_fn(rows, 1, |k, _| (k % 5) as f64),
-        modes: vec![0; rows],
+    let log = |rows: usize, moving: bool| {
+        Log::new(
+            DMatrix::from_fn(rows, 1, |k, _| if moving { (k % 7) as f64 } else { 1.0 }),
+            DMatrix::from_fn(rows, 1, |k, _| (k % 5) as f64),
+        )
+        .in_modes(vec![0; rows])
     };
     let refused = |logs: &[Log]| identify(logs, &Settings::default()).unwrap_err();
     assert!(matches!(refused(&[]), Error::TooShort { samples: 0, .. }));
@@ -316,10 +304,8 @@ fn what_a_log_lacks_is_said() {
         number: 1,
     };
     assert_eq!(refused(&[log(200, false)]), still);
-    let none = Settings {
-        order: Some(0),
-        ..Settings::default()
-    };
+    let mut none = Settings::default();
+    none.order = Some(0);
     assert_eq!(
         identify(&[log(200, true)], &none).unwrap_err(),
         Error::NoState

@@ -11,6 +11,7 @@ use serde::{Deserialize, Serialize};
 /// Departures of the true plant; the default is none.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(default)]
+#[non_exhaustive]
 pub struct Deviation {
     /// Gain of each actuator (m); none given: 1.
     pub input_gain: Vec<f64>,
@@ -29,6 +30,7 @@ pub struct Deviation {
 
 /// A constant that is added somewhere during `[from, until)` seconds.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[expect(clippy::exhaustive_structs, reason = "where, when, how much")]
 pub struct Load {
     /// Where.
     pub at: Port,
@@ -43,6 +45,7 @@ pub struct Load {
 /// Where a load acts, counted from 0.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
+#[expect(clippy::exhaustive_enums, reason = "all that moves the state")]
 pub enum Port {
     /// On an input, behind its actuator.
     Input(usize),
@@ -54,6 +57,7 @@ pub enum Port {
 
 /// A mode (0-based) that is told during `[from, until)` seconds, whichever is active.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[expect(clippy::exhaustive_structs, reason = "what, when")]
 pub struct Told {
     /// First instant in seconds.
     pub from: f64,
@@ -158,6 +162,7 @@ impl fmt::Display for Port {
 
 /// A mode of a true plant that is unstable where the model's is not.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
 pub struct Destabilised {
     /// The mode, from 0.
     pub mode: usize,

@@ -5,6 +5,7 @@ use super::{Mode, OperatingPoint, SwitchedPlant};
 
 /// Numbers of states `n`, inputs `m`, outputs `p` and disturbances `s`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[expect(clippy::exhaustive_structs, reason = "the sizes of A, B, C and E")]
 pub struct Dimensions {
     /// `n`
     pub states: usize,

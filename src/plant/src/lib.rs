@@ -11,19 +11,15 @@
 //! disturbance and `f` the additive sensor fault. Everything is in the user's physical units.
 //!
 //! ```
-//! use ftc_plant::{Dimensions, Mode, OperatingPoint, PlantError, SwitchedPlant};
+//! use ftc_plant::{Dimensions, Mode, PlantError, SwitchedPlant};
 //! use nalgebra::dmatrix;
 //!
-//! let mode = |pole: f64| Mode {
-//!     name: format!("pole {pole}"),
-//!     a: dmatrix![pole],
-//!     b: dmatrix![0.5],
-//!     c: dmatrix![1.0],
-//!     e: dmatrix![0.1],
-//!     f: dmatrix![0.0],
-//!     operating_point: OperatingPoint::zero(1, 1, 1),
+//! let mode = |pole: f64| {
+//!     Mode::new(dmatrix![pole], dmatrix![0.5], dmatrix![1.0]) // A, B, C
+//!         .named(format!("pole {pole}"))
+//!         .with_disturbance(dmatrix![0.1], dmatrix![0.0]) // E, F
 //! };
-//! let mut plant = SwitchedPlant { sample_time: 0.1, modes: vec![mode(0.9), mode(0.8)] };
+//! let mut plant = SwitchedPlant::new(0.1, vec![mode(0.9), mode(0.8)]);
 //! assert_eq!(Dimensions::check(&plant)?.states, 1);
 //! plant.modes[1].b = dmatrix![0.5, 0.5];
 //! let error = Dimensions::check(&plant).unwrap_err();
@@ -55,6 +51,7 @@ use serde::{Deserialize, Serialize};
 
 /// A point around which a mode was linearised; a steady state of that mode.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[expect(clippy::exhaustive_structs, reason = "a steady state is x0, u0, y0")]
 pub struct OperatingPoint {
     /// State `x0` (n).
     pub x: Vec<f64>,
@@ -66,6 +63,7 @@ pub struct OperatingPoint {
 
 /// One linear mode; the paper's `(A_i, B_i, C_i, E_i)` of (1) with both disturbance channels.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[non_exhaustive]
 pub struct Mode {
     /// What the user calls it.
     pub name: String,
@@ -90,6 +88,7 @@ pub struct Mode {
 
 /// A plant that switches between known modes by a known signal.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[non_exhaustive]
 pub struct SwitchedPlant {
     /// Sample time `Te` in seconds.
     pub sample_time: f64,
@@ -109,8 +108,8 @@ impl OperatingPoint {
 }
 
 impl Mode {
-    /// A mode without a name and a known disturbance, about the origin; the matrices fit together
-    /// ([`Dimensions::check`] says whether they do).
+    /// A mode of these `A`, `B` and `C`, about the origin, without a name and without a known disturbance;
+    /// [`Dimensions::check`] says whether the matrices fit together.
     pub fn new(a: DMatrix<f64>, b: DMatrix<f64>, c: DMatrix<f64>) -> Self {
         let (states, inputs, outputs) = (a.nrows(), b.ncols(), c.nrows());
         Self {
@@ -121,6 +120,27 @@ impl Mode {
             e: DMatrix::zeros(states, 0),
             f: DMatrix::zeros(outputs, 0),
             operating_point: OperatingPoint::zero(states, inputs, outputs),
+        }
+    }
+
+    /// The same mode with a name.
+    pub fn named(self, name: impl Into<String>) -> Self {
+        Self {
+            name: name.into(),
+            ..self
+        }
+    }
+
+    /// The same mode under a disturbance: to the state by `E` (n x s), to the output by `F` (p x s).
+    pub fn with_disturbance(self, e: DMatrix<f64>, f: DMatrix<f64>) -> Self {
+        Self { e, f, ..self }
+    }
+
+    /// The same mode about another operating point.
+    pub fn about(self, operating_point: OperatingPoint) -> Self {
+        Self {
+            operating_point,
+            ..self
         }
     }
 
@@ -144,6 +164,11 @@ impl Mode {
 }
 
 impl SwitchedPlant {
+    /// A plant with this sample time in seconds and these modes.
+    pub fn new(sample_time: f64, modes: Vec<Mode>) -> Self {
+        Self { sample_time, modes }
+    }
+
     /// Sizes; every mode has the same (see [`Dimensions::check`]).
     pub fn dimensions(&self) -> Dimensions {
         let mode = &self.modes[0];

@@ -29,6 +29,10 @@ const SQRT_3: f64 = 1.732_050_807_568_877_2;
 /// Physical parameters, SI units.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
+#[expect(
+    clippy::exhaustive_structs,
+    reason = "the parameters of the equations above"
+)]
 pub struct Rectifier {
     /// Line inductance `L` in H.
     pub inductance: f64,

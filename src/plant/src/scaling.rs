@@ -5,6 +5,10 @@ use nalgebra::{DMatrix, DVector};
 
 /// Nominal magnitudes by which each signal is divided (all positive).
 #[derive(Clone, Debug, PartialEq)]
+#[expect(
+    clippy::exhaustive_structs,
+    reason = "a magnitude of each signal of the model"
+)]
 pub struct Scaling {
     /// States (n).
     pub states: Vec<f64>,
@@ -16,6 +20,7 @@ pub struct Scaling {
 
 /// Magnitudes that are known of some signals; lists may be shorter than there are signals.
 #[derive(Clone, Debug, Default, PartialEq)]
+#[expect(clippy::exhaustive_structs, reason = "as Scaling")]
 pub struct Known {
     /// States (n).
     pub states: Vec<Option<f64>>,

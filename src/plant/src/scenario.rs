@@ -5,6 +5,7 @@ use serde::{Deserialize, Serialize};
 
 /// A complete experiment; every signal is a pure function of the tick.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[non_exhaustive]
 pub struct Scenario {
     /// Number of samples.
     pub steps: u64,
@@ -26,6 +27,7 @@ pub struct Scenario {
 
 /// A mode (0-based) and the time in seconds from which it is active.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[expect(clippy::exhaustive_structs, reason = "which mode, from when on")]
 pub struct ModeInterval {
     /// Start in seconds.
     pub from: f64,
@@ -36,6 +38,10 @@ pub struct ModeInterval {
 /// A signal over time in seconds.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(tag = "kind", rename_all = "lowercase")]
+#[expect(
+    clippy::exhaustive_enums,
+    reason = "a new kind must be drawn and read everywhere: the compiler says where"
+)]
 pub enum Waveform {
     /// The same value for ever.
     Constant {
@@ -87,6 +93,7 @@ pub enum Waveform {
 
 /// A fault of one sensor during `[from, until)` seconds.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[expect(clippy::exhaustive_structs, reason = "which sensor, when, what")]
 pub struct FaultEvent {
     /// Sensor, 0-based.
     pub sensor: usize,
@@ -101,6 +108,10 @@ pub struct FaultEvent {
 /// What a faulty sensor reads instead of `y`.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(tag = "kind", rename_all = "kebab-case")]
+#[expect(
+    clippy::exhaustive_enums,
+    reason = "a new kind must be simulated everywhere: the compiler says where"
+)]
 pub enum FaultKind {
     /// `y + size`.
     Bias {

@@ -67,6 +67,7 @@ const MOST_STEPS: usize = 10_000;
 /// The tolerance was not met in as many steps as are allowed: the equations have no solution there
 /// (a singularity), or change faster than anything meant to be simulated.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[expect(clippy::exhaustive_structs, reason = "it has nothing to add")]
 pub struct Stalled;
 
 /// Advances `state` under `derivative` by `duration` seconds.

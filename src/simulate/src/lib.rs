@@ -8,7 +8,7 @@
 //! use nalgebra::dmatrix;
 //!
 //! let modes = vec![Mode::new(dmatrix![0.9], dmatrix![0.2], dmatrix![1.0])];
-//! let plant = SwitchedPlant { sample_time: 1.0, modes };
+//! let plant = SwitchedPlant::new(1.0, modes);
 //! let dims = plant.dimensions();
 //! let mut scenario = Scenario::new(200, vec![Waveform::Constant { value: 1.0 }], dims);
 //! scenario.noise = vec![0.001];

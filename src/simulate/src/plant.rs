@@ -391,42 +391,29 @@ impl PlantSimulator {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use ftc_plant::OperatingPoint;
-    use ftc_plant::scenario::{FaultKind, ModeInterval, Waveform};
+    use ftc_plant::scenario::{FaultKind, Waveform};
     use nalgebra::dmatrix;
     use proptest::prelude::*;
 
     /// Two states, one input, two outputs, one disturbance; an event on either sensor.
     fn simulator() -> PlantSimulator {
-        let mode = Mode {
-            name: "only".into(),
-            a: dmatrix![0.5, 0.1; 0.0, 0.4],
-            b: dmatrix![1.0; 0.5],
-            c: dmatrix![1.0, 0.0; 0.0, 1.0],
-            e: dmatrix![1.0; 1.0],
-            f: dmatrix![0.0; 0.5],
-            operating_point: OperatingPoint::zero(2, 1, 2),
-        };
+        let mode = Mode::new(
+            dmatrix![0.5, 0.1; 0.0, 0.4],
+            dmatrix![1.0; 0.5],
+            dmatrix![1.0, 0.0; 0.0, 1.0],
+        )
+        .named("only")
+        .with_disturbance(dmatrix![1.0; 1.0], dmatrix![0.0; 0.5]);
         let event = |sensor, kind| FaultEvent {
             sensor,
             from: 0.0,
             until: 9.0,
             kind,
         };
-        let plant = SwitchedPlant {
-            sample_time: 1.0,
-            modes: vec![mode],
-        };
-        let scenario = Scenario {
-            steps: 9,
-            noise: vec![0.1; 2],
-            seed: 1,
-            schedule: vec![ModeInterval { from: 0.0, mode: 0 }],
-            reference: vec![Waveform::ZERO],
-            fault: vec![Waveform::ZERO; 2],
-            events: vec![event(0, FaultKind::Stuck), event(1, FaultKind::Dropout)],
-            disturbance: vec![Waveform::ZERO],
-        };
+        let plant = SwitchedPlant::new(1.0, vec![mode]);
+        let mut scenario = Scenario::new(9, vec![Waveform::ZERO], plant.dimensions());
+        scenario.noise = vec![0.1; 2];
+        scenario.events = vec![event(0, FaultKind::Stuck), event(1, FaultKind::Dropout)];
         PlantSimulator::new(plant, scenario)
     }
 

@@ -12,44 +12,43 @@ use nalgebra::{DVector, dmatrix};
 
 /// Two modes, two states, one input, one output, one disturbance.
 fn plant() -> SwitchedPlant {
-    let mode = |gain: f64| Mode {
-        name: "mode".into(),
-        a: dmatrix![0.5, 0.1; 0.0, 0.4],
-        b: dmatrix![gain; 0.5],
-        c: dmatrix![1.0, -1.0],
-        e: dmatrix![1.0; 0.0],
-        f: dmatrix![0.25],
-        operating_point: OperatingPoint {
+    let mode = |gain: f64| {
+        Mode::new(
+            dmatrix![0.5, 0.1; 0.0, 0.4],
+            dmatrix![gain; 0.5],
+            dmatrix![1.0, -1.0],
+        )
+        .named("mode")
+        .with_disturbance(dmatrix![1.0; 0.0], dmatrix![0.25])
+        .about(OperatingPoint {
             x: vec![1.0, 2.0],
             u: vec![3.0],
             y: vec![4.0],
-        },
+        })
     };
-    SwitchedPlant {
-        sample_time: 0.5,
-        modes: vec![mode(1.0), mode(2.0)],
-    }
+    SwitchedPlant::new(0.5, vec![mode(1.0), mode(2.0)])
 }
 
 fn scenario() -> Scenario {
-    Scenario {
-        steps: 20,
-        noise: vec![0.0],
-        seed: 1,
-        schedule: vec![
-            ModeInterval { from: 0.0, mode: 0 },
-            ModeInterval { from: 4.0, mode: 1 },
-        ],
-        reference: vec![Waveform::ZERO],
-        fault: vec![Waveform::ZERO],
-        events: Vec::new(),
-        disturbance: vec![Waveform::Sine {
-            amplitude: 0.3,
-            period: 3.0,
-            phase: 0.0,
-            offset: 0.0,
-        }],
-    }
+    let mut scenario = Scenario::new(20, vec![Waveform::ZERO], plant().dimensions());
+    scenario.schedule = vec![
+        ModeInterval { from: 0.0, mode: 0 },
+        ModeInterval { from: 4.0, mode: 1 },
+    ];
+    scenario.disturbance = vec![Waveform::Sine {
+        amplitude: 0.3,
+        period: 3.0,
+        phase: 0.0,
+        offset: 0.0,
+    }];
+    scenario
+}
+
+/// The one departure that `set` makes.
+fn deviating(set: impl Fn(&mut Deviation)) -> Deviation {
+    let mut deviation = Deviation::default();
+    set(&mut deviation);
+    deviation
 }
 
 /// One state per sample under the command `3 + k / 10`.
@@ -129,21 +128,17 @@ fn without_departures_nothing_changes() {
 
 #[test]
 fn actuators_have_gains_and_faults() {
-    let gained = run(Deviation {
-        input_gain: vec![1.1],
-        ..Deviation::default()
-    });
+    let gained = run(deviating(|deviation| deviation.input_gain = vec![1.1]));
     same(&gained, &expected(|k| 1.1 * asked(k), |_| 0.0, |_| 0.0));
     let faulty = |kind| {
-        run(Deviation {
-            actuator_faults: vec![FaultEvent {
+        run(deviating(|deviation| {
+            deviation.actuator_faults = vec![FaultEvent {
                 sensor: 0,
                 from: 2.0,
                 until: 5.0,
                 kind,
-            }],
-            ..Deviation::default()
-        })
+            }]
+        }))
     };
     let acting = |k: usize, instead: f64| if within(k) { instead } else { asked(k) };
     same(
@@ -169,15 +164,14 @@ fn actuators_have_gains_and_faults() {
 #[test]
 fn loads_act_where_they_are_put() {
     let at = |at| {
-        run(Deviation {
-            loads: vec![Load {
+        run(deviating(|deviation| {
+            deviation.loads = vec![Load {
                 at,
                 from: 2.0,
                 until: 5.0,
                 size: 0.2,
-            }],
-            ..Deviation::default()
-        })
+            }]
+        }))
     };
     let load = |k: usize| if within(k) { 0.2 } else { 0.0 };
     same(
@@ -190,10 +184,7 @@ fn loads_act_where_they_are_put() {
 
 #[test]
 fn readings_come_late() {
-    let states = run(Deviation {
-        sensor_delay: 3,
-        ..Deviation::default()
-    });
+    let states = run(deviating(|deviation| deviation.sensor_delay = 3));
     same(&states, &expected(asked, |_| 0.0, |_| 0.0));
     for (k, state) in states.iter().enumerate() {
         let read = if k < 3 { 4.0 } else { states[k - 3].y_true[0] };
@@ -203,18 +194,14 @@ fn readings_come_late() {
 
 #[test]
 fn the_mode_is_told_late_or_wrong() {
-    let late = run(Deviation {
-        mode_delay: 2,
-        ..Deviation::default()
-    });
-    let wrong = run(Deviation {
-        told: vec![Told {
+    let late = run(deviating(|deviation| deviation.mode_delay = 2));
+    let wrong = run(deviating(|deviation| {
+        deviation.told = vec![Told {
             from: 1.0,
             until: 2.0,
             mode: 1,
-        }],
-        ..Deviation::default()
-    });
+        }]
+    }));
     for k in 0..20 {
         assert_eq!(
             (late[k].mode, late[k].told),
@@ -240,33 +227,20 @@ fn derivatives_know_the_departures() {
     };
     for (deviation, late) in [
         (
-            Deviation {
-                input_gain: vec![1.3],
-                ..Deviation::default()
-            },
+            deviating(|deviation| deviation.input_gain = vec![1.3]),
             false,
         ),
         (
-            Deviation {
-                actuator_faults: vec![fault(FaultKind::GainLoss { loss: 0.25 })],
-                ..Deviation::default()
-            },
+            deviating(|deviation| {
+                deviation.actuator_faults = vec![fault(FaultKind::GainLoss { loss: 0.25 })]
+            }),
             false,
         ),
         (
-            Deviation {
-                actuator_faults: vec![fault(FaultKind::Stuck)],
-                ..Deviation::default()
-            },
+            deviating(|deviation| deviation.actuator_faults = vec![fault(FaultKind::Stuck)]),
             false,
         ),
-        (
-            Deviation {
-                sensor_delay: 2,
-                ..Deviation::default()
-            },
-            true,
-        ),
+        (deviating(|deviation| deviation.sensor_delay = 2), true),
     ] {
         let truth = TruePlant::AsDesigned.with_deviation(deviation);
         let simulator = PlantSimulator::with_true_plant(plant(), truth, scenario());

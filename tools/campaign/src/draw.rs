@@ -3,7 +3,7 @@
 use crate::Options;
 use ftc_design::Design;
 use ftc_plant::scenario::{FaultEvent, FaultKind, ModeInterval, Scenario, Waveform};
-use ftc_plant::{Mode, SwitchedPlant, TruePlant};
+use ftc_plant::{SwitchedPlant, TruePlant};
 use nalgebra::DMatrix;
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::{Rng, SeedableRng};
@@ -26,6 +26,7 @@ const SHORTEST_MODE: f64 = 0.1;
 
 /// What happens in one run.
 #[derive(Clone, Debug, PartialEq)]
+#[non_exhaustive]
 pub struct Drawn {
     /// The experiment.
     pub scenario: Scenario,
@@ -92,21 +93,18 @@ pub fn draw(design: &Design, options: &Options, run: u64) -> Drawn {
     let events = (0..faults)
         .map(|_| fault(design, options, &mut draws))
         .collect();
+    let mut scenario = base.clone();
+    for deviation in &mut scenario.noise {
+        *deviation *= noise;
+    }
+    scenario.seed = draws.0.next_u64();
+    scenario.schedule = schedule;
+    scenario.reference = reference;
+    scenario.fault.fill(Waveform::ZERO);
+    scenario.events = events;
+    scenario.disturbance = disturbance;
     Drawn {
-        scenario: Scenario {
-            steps: base.steps,
-            noise: base
-                .noise
-                .iter()
-                .map(|deviation| noise * deviation)
-                .collect(),
-            seed: draws.0.next_u64(),
-            schedule,
-            reference,
-            fault: vec![Waveform::ZERO; base.fault.len()],
-            events,
-            disturbance,
-        },
+        scenario,
         truth,
         model_error,
         noise,
@@ -204,18 +202,16 @@ fn truth(design: &Design, error: f64, draws: &mut Draws) -> TruePlant {
     let modes = nominal
         .modes
         .iter()
-        .map(|mode| Mode {
-            a: off(&mode.a),
-            b: off(&mode.b),
-            e: off(&mode.e),
-            ..mode.clone()
+        .map(|mode| {
+            let mut mode = mode.clone();
+            mode.a = off(&mode.a);
+            mode.b = off(&mode.b);
+            mode.e = off(&mode.e);
+            mode
         })
         .collect();
     TruePlant::Linear {
-        plant: SwitchedPlant {
-            sample_time: nominal.sample_time,
-            modes,
-        },
+        plant: SwitchedPlant::new(nominal.sample_time, modes),
     }
     .with_deviation(deviation)
 }

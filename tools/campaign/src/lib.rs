@@ -144,6 +144,7 @@ fn is_linear(design: &Design) -> bool {
 
 /// How a shard is watched and stopped.
 #[derive(Debug, Default)]
+#[non_exhaustive]
 pub struct Watch {
     /// Set it to stop: runs that are done are kept.
     pub stop: AtomicBool,

@@ -7,6 +7,7 @@ use std::ops::Range;
 
 /// The runs of a campaign that were done, and what they say.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[non_exhaustive]
 pub struct Partial {
     /// Name of the design.
     pub design: String,
@@ -22,6 +23,7 @@ pub struct Partial {
 
 /// Why parts do not become a whole.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
 pub enum MergeError {
     /// There is nothing to merge.
     #[error("there is no part: give at least one")]

@@ -16,6 +16,7 @@ const DIVERGED: f64 = 1e12;
 
 /// What came of one run.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[non_exhaustive]
 pub struct Outcome {
     /// Its number.
     pub run: u64,
@@ -43,6 +44,7 @@ pub struct Outcome {
 
 /// One fault and whether it was seen.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[non_exhaustive]
 pub struct FaultDetection {
     /// Name of its kind.
     pub kind: String,

@@ -11,7 +11,6 @@ use campaign::{Options, Outcome, draw, run_one};
 use ftc_control::Controller;
 use ftc_control::parameters::EstimatorMethod;
 use ftc_design::Design;
-use ftc_design::assembly::EstimatorSpec;
 use ftc_plant::scenario::FaultKind;
 use rayon::prelude::*;
 
@@ -24,11 +23,9 @@ const MODEL_ERROR: f64 = 0.1;
 /// An example with the default estimator in place of its own.
 fn design(example: &str) -> Design {
     examples::design(example, |request| {
-        request.estimator = EstimatorSpec {
-            disturbance: request.estimator.disturbance.take(),
-            threshold: request.estimator.threshold.clone(),
-            ..EstimatorSpec::default()
-        };
+        let own = std::mem::take(&mut request.estimator);
+        request.estimator.disturbance = own.disturbance;
+        request.estimator.threshold = own.threshold;
         assert_eq!(request.estimator.method, EstimatorMethod::Observer);
     })
 }

@@ -95,11 +95,9 @@ pub fn identify(asked: &Asked) -> Result<(String, String), Failure> {
     }
     let sample_time = sample_time(asked, &files)?;
     let logs: Vec<Log> = files.iter().map(|file| file.log.clone()).collect();
-    let settings = Settings {
-        order: asked.order,
-        periods: asked.periods(sample_time),
-        ..Settings::default()
-    };
+    let mut settings = Settings::default();
+    settings.order = asked.order;
+    settings.periods = asked.periods(sample_time);
     let found = ftc_identify::identify(&logs, &settings).map_err(|error| error.to_string())?;
     let first = files
         .first()
@@ -157,11 +155,7 @@ fn read(path: &Path, asked: &Asked) -> Result<Read, Unusable> {
         has_modes: mode.is_some(),
         inputs: named(&inputs),
         outputs: named(&outputs),
-        log: Log {
-            inputs: matrix(&u, inputs.len()),
-            outputs: matrix(&y, outputs.len()),
-            modes,
-        },
+        log: Log::new(matrix(&u, inputs.len()), matrix(&y, outputs.len())).in_modes(modes),
     })
 }
 

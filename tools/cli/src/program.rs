@@ -646,12 +646,11 @@ fn synthesised(
     progress.tell("solving for gains and certifying them");
     let watch = |step: Step| match step {
         Step::Iteration { number, usual, .. } => progress.iterate(step, number, usual),
-        Step::GeneralSolver => progress.tell(step.to_string()),
+        other => progress.tell(other.to_string()),
     };
-    let run = Run {
-        solver,
-        watch: &watch,
-    };
+    let mut run = Run::default();
+    run.solver = solver;
+    run.watch = &watch;
     ftc_design::assembly::assemble_with(request, &run)
 }
 

@@ -44,10 +44,8 @@ pub(crate) fn request(file: &DesignFile, folder: &Path, notes: &Notes) -> Result
     let plant = given.plant;
     let dims = plant.dimensions();
     let disturbance = disturbance(file, dims)?;
-    let control = ControlSpec {
-        resonators: resonators(file, disturbance.as_ref())?,
-        ..control(&file.controller, &signals, dims)?
-    };
+    let mut control = control(&file.controller, &signals, dims)?;
+    control.resonators = resonators(file, disturbance.as_ref())?;
     let observer = observer(&file.observer, &control)?;
     let logs = Logs {
         plant: &plant,
@@ -79,17 +77,15 @@ pub(crate) fn request(file: &DesignFile, folder: &Path, notes: &Notes) -> Result
         end: true_plant::end(file),
     }
     .resolve()?;
-    let usual = Request::new(&file.name, plant, signals, scenario);
-    Ok(Request {
-        true_plant,
-        control,
-        bumpless: file.controller.bumpless.unwrap_or(usual.bumpless),
-        feedforward: file.controller.feedforward.unwrap_or(usual.feedforward),
-        observer,
-        estimator,
-        compensation: compensation(file, usual.compensation),
-        ..usual
-    })
+    let mut request = Request::new(&file.name, plant, signals, scenario);
+    request.true_plant = true_plant;
+    request.control = control;
+    request.bumpless = file.controller.bumpless.unwrap_or(request.bumpless);
+    request.feedforward = file.controller.feedforward.unwrap_or(request.feedforward);
+    request.observer = observer;
+    request.estimator = estimator;
+    request.compensation = compensation(file, request.compensation);
+    Ok(request)
 }
 
 /// Puts the key before a complaint.
@@ -125,12 +121,8 @@ fn signals(given: &schema::Signals, found: &plant::Found) -> Result<Signals, Str
         )?,
         None => Vec::new(),
     };
-    let mut signals = Signals {
-        inputs,
-        outputs,
-        states,
-        disturbances,
-    };
+    let mut signals = Signals::new(inputs, outputs, states);
+    signals.disturbances = disturbances;
     complete_nominal_values(&mut signals, plant);
     for signal in &mut signals.disturbances {
         signal.nominal = Some(signal.nominal)
@@ -142,11 +134,10 @@ fn signals(given: &schema::Signals, found: &plant::Found) -> Result<Signals, Str
 
 /// The state that holds a past input.
 fn held(input: &Signal) -> Signal {
-    Signal {
-        unit: input.unit.clone(),
-        nominal: input.nominal,
-        ..Signal::new(&format!("{} held", input.name))
-    }
+    let mut signal = Signal::new(&format!("{} held", input.name));
+    signal.unit = input.unit.clone();
+    signal.nominal = input.nominal;
+    signal
 }
 
 fn channels(
@@ -212,13 +203,12 @@ fn signal(info: &SignalInfo, default_name: String, operating: f64) -> Result<Sig
     if unit.as_deref().is_some_and(|unit| !check::printable(unit)) {
         return Err("unit has a character that is not printable: give the unit's letters".into());
     }
-    Ok(Signal {
-        name,
-        unit,
-        nominal: info.nominal.or(operating).or(range).unwrap_or(UNKNOWN),
-        min,
-        max,
-    })
+    let mut signal = Signal::new(&name);
+    signal.unit = unit;
+    signal.nominal = info.nominal.or(operating).or(range).unwrap_or(UNKNOWN);
+    signal.min = min;
+    signal.max = max;
+    Ok(signal)
 }
 
 /// Marks a nominal value of which nothing is known until the plant has been looked at.
@@ -277,27 +267,23 @@ fn control(
     })?;
     let decay = given.decay.unwrap_or(usual.decay);
     at("controller.decay", check::decay(decay))?;
-    let output_weight = weight("output_weight", &given.output_weight, usual.output_weight)?;
-    let integral_weight = weight(
+    let mut spec = usual;
+    spec.latency = latency;
+    spec.lyapunov = given.lyapunov.map_or(spec.lyapunov, lyapunov);
+    spec.decay = decay;
+    spec.objective = match given.objective {
+        None => spec.objective,
+        Some(ObjectiveKind::Attenuation) => Objective::Attenuation,
+        Some(ObjectiveKind::Decay) => Objective::Decay,
+    };
+    spec.output_weight = weight("output_weight", &given.output_weight, spec.output_weight)?;
+    spec.integral_weight = weight(
         "integral_weight",
         &given.integral_weight,
-        usual.integral_weight,
+        spec.integral_weight,
     )?;
-    let input_weight = weight("input_weight", &given.input_weight, usual.input_weight)?;
-    Ok(ControlSpec {
-        latency,
-        lyapunov: given.lyapunov.map_or(usual.lyapunov, lyapunov),
-        decay,
-        objective: match given.objective {
-            None => usual.objective,
-            Some(ObjectiveKind::Attenuation) => Objective::Attenuation,
-            Some(ObjectiveKind::Decay) => Objective::Decay,
-        },
-        output_weight,
-        integral_weight,
-        input_weight,
-        ..usual
-    })
+    spec.input_weight = weight("input_weight", &given.input_weight, spec.input_weight)?;
+    Ok(spec)
 }
 
 /// The angles of the internal model's resonators; none where no internal model is wanted.
@@ -385,17 +371,16 @@ fn observer(given: &schema::Observer, control: &ControlSpec) -> Result<ObserverS
     let usual = ObserverSpec::beside(control);
     let decay = given.decay.unwrap_or(usual.decay);
     at("observer.decay", check::decay(decay))?;
-    Ok(ObserverSpec {
-        kind: match given.kind {
-            None => usual.kind,
-            Some(ObserverKind::Uio) => Kind::Uio,
-            Some(ObserverKind::Luenberger) => Kind::Luenberger,
-            Some(ObserverKind::Kalman) => Kind::Kalman,
-            Some(ObserverKind::Auto) => Kind::Auto,
-        },
-        decay,
-        ..usual
-    })
+    let mut observer = usual;
+    observer.kind = match given.kind {
+        None => observer.kind,
+        Some(ObserverKind::Uio) => Kind::Uio,
+        Some(ObserverKind::Luenberger) => Kind::Luenberger,
+        Some(ObserverKind::Kalman) => Kind::Kalman,
+        Some(ObserverKind::Auto) => Kind::Auto,
+    };
+    observer.decay = decay;
+    Ok(observer)
 }
 
 fn disturbance(file: &DesignFile, dims: Dimensions) -> Result<Option<KnownDisturbance>, String> {
@@ -432,11 +417,10 @@ fn disturbance(file: &DesignFile, dims: Dimensions) -> Result<Option<KnownDistur
             Some(values)
         }
     };
-    Ok(Some(KnownDisturbance {
-        period: given.period,
-        harmonics,
-        amplitude,
-    }))
+    let mut disturbance = KnownDisturbance::new(given.period);
+    disturbance.harmonics = harmonics;
+    disturbance.amplitude = amplitude;
+    Ok(Some(disturbance))
 }
 
 fn compensation(file: &DesignFile, usual: parameters::Compensation) -> parameters::Compensation {

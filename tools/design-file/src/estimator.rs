@@ -61,17 +61,17 @@ pub(crate) fn estimator(
                 .into(),
         );
     }
-    Ok(EstimatorSpec {
-        method,
-        response_length,
-        database,
-        threshold: threshold(given, dims, usual.threshold)?,
-        debounce,
-        stuck_after,
-        adapt: given.adapt.unwrap_or(usual.adapt),
-        disturbance,
-        hypotheses,
-    })
+    let mut estimator = EstimatorSpec::default();
+    estimator.method = method;
+    estimator.response_length = response_length;
+    estimator.database = database;
+    estimator.threshold = threshold(given, dims, usual.threshold)?;
+    estimator.debounce = debounce;
+    estimator.stuck_after = stuck_after;
+    estimator.adapt = given.adapt.unwrap_or(usual.adapt);
+    estimator.disturbance = disturbance;
+    estimator.hypotheses = hypotheses;
+    Ok(estimator)
 }
 
 fn hypotheses(given: &schema::Estimator, dims: Dimensions) -> Result<HypothesesSpec, String> {
@@ -102,31 +102,31 @@ fn hypotheses(given: &schema::Estimator, dims: Dimensions) -> Result<HypothesesS
         }
         (true, length) => Some(within("mode_length", length, MODE_LENGTH, 2.0, 1e9)?),
     };
-    Ok(HypothesesSpec {
-        model_error: within(
-            "model_error",
-            given.model_error,
-            usual.model_error,
-            0.0,
-            1.0,
-        )?,
-        fault_rate: within("fault_rate", given.fault_rate, usual.fault_rate, 1e-12, 0.1)?,
-        fault_length: within(
-            "fault_length",
-            given.fault_length,
-            usual.fault_length,
-            2.0,
-            1e9,
-        )?,
-        ambiguous: match given.ambiguous {
-            None => usual.ambiguous,
-            Some(schema::Ambiguous::TrustSensors) => parameters::Ambiguous::TrustSensors,
-            Some(schema::Ambiguous::TrustModel) => parameters::Ambiguous::TrustModel,
-        },
-        mode_length,
-        authority: sizes("estimator.authority", &given.authority, dims.outputs)?,
-        input_load: sizes("estimator.input_load", &given.input_load, dims.inputs)?,
-    })
+    let mut hypotheses = HypothesesSpec::default();
+    hypotheses.model_error = within(
+        "model_error",
+        given.model_error,
+        usual.model_error,
+        0.0,
+        1.0,
+    )?;
+    hypotheses.fault_rate = within("fault_rate", given.fault_rate, usual.fault_rate, 1e-12, 0.1)?;
+    hypotheses.fault_length = within(
+        "fault_length",
+        given.fault_length,
+        usual.fault_length,
+        2.0,
+        1e9,
+    )?;
+    hypotheses.ambiguous = match given.ambiguous {
+        None => usual.ambiguous,
+        Some(schema::Ambiguous::TrustSensors) => parameters::Ambiguous::TrustSensors,
+        Some(schema::Ambiguous::TrustModel) => parameters::Ambiguous::TrustModel,
+    };
+    hypotheses.mode_length = mode_length;
+    hypotheses.authority = sizes("estimator.authority", &given.authority, dims.outputs)?;
+    hypotheses.input_load = sizes("estimator.input_load", &given.input_load, dims.inputs)?;
+    Ok(hypotheses)
 }
 
 /// The database that is named, if any is.

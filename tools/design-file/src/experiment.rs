@@ -38,20 +38,21 @@ impl ScenarioContext<'_> {
         let (outputs, disturbances) = (self.dims.outputs, self.dims.disturbances);
         let schedule = self.schedule()?;
         let first = schedule[0].mode;
-        Ok(Scenario {
-            steps,
-            noise: self.noise()?,
-            seed,
-            reference: self.channels("reference", &given.reference, self.tracked.len(), |at| {
-                self.step(at, first, steps)
-            })?,
-            fault: self.channels("fault", &given.fault, outputs, |_| Waveform::ZERO)?,
-            disturbance: self.channels("disturbance", &given.disturbance, disturbances, |at| {
+        let noise = self.noise()?;
+        let reference = self.channels("reference", &given.reference, self.tracked.len(), |at| {
+            self.step(at, first, steps)
+        })?;
+        let mut scenario = Scenario::new(steps, reference, self.dims);
+        scenario.noise = noise;
+        scenario.seed = seed;
+        scenario.fault = self.channels("fault", &given.fault, outputs, |_| Waveform::ZERO)?;
+        scenario.disturbance =
+            self.channels("disturbance", &given.disturbance, disturbances, |at| {
                 self.expected_disturbance(at)
-            })?,
-            events: self.events()?,
-            schedule,
-        })
+            })?;
+        scenario.events = self.events()?;
+        scenario.schedule = schedule;
+        Ok(scenario)
     }
 
     fn noise(&self) -> Result<Vec<f64>, String> {

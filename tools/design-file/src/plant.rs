@@ -139,10 +139,10 @@ pub(crate) fn read(file: &DesignFile, folder: &Path, notes: &Notes) -> Result<Fo
 
 /// The modes as one plant, as it stands in the file.
 fn assembled(file: &DesignFile, modes: &[Given]) -> Result<SwitchedPlant, String> {
-    let plant = SwitchedPlant {
-        sample_time: file.sample_time,
-        modes: modes.iter().map(|given| given.mode.clone()).collect(),
-    };
+    let plant = SwitchedPlant::new(
+        file.sample_time,
+        modes.iter().map(|given| given.mode.clone()).collect(),
+    );
     sized(&plant).map(|_| plant)
 }
 
@@ -416,19 +416,16 @@ fn mode(source: &Source, number: usize, disturbances: usize) -> Result<Given, St
         );
     }
     Ok(Given {
-        mode: Mode {
-            name: source
-                .given
-                .name
-                .clone()
-                .unwrap_or(format!("mode {number}")),
-            e: channel("E", n)?,
-            f: channel("F", p)?,
-            a,
-            b,
-            c,
-            operating_point,
-        },
+        mode: Mode::new(a, b, c)
+            .named(
+                source
+                    .given
+                    .name
+                    .clone()
+                    .unwrap_or(format!("mode {number}")),
+            )
+            .with_disturbance(channel("E", n)?, channel("F", p)?)
+            .about(operating_point),
         feedthrough: feedthrough.filter(|d| d.iter().any(|&entry| entry != 0.0)),
     })
 }

@@ -3,6 +3,11 @@
 //! A key exists exactly when a field here has its name: what is unknown is refused, and the
 //! nearest known key is found from these structs. What an absent key means is written down in
 //! [`crate::defaults`]; what a value must satisfy, in [`crate::check`].
+#![expect(
+    clippy::exhaustive_structs,
+    clippy::exhaustive_enums,
+    reason = "the keys of a design file: only what reads one makes these"
+)]
 
 use crate::event::Event;
 use crate::signal::Signal;

@@ -141,22 +141,22 @@ fn deviation(
         })
     });
     let names = Names::new(found, signals);
-    Ok(Deviation {
-        input_gain,
-        sensor_delay: delay("scenario.plant.sensor_delay", given.sensor_delay)?,
-        loads: each("loads", &given.loads, |load, key| {
-            let found = self::load(load, &names)?;
-            begins(key, found.from);
-            Ok(found)
-        })?,
-        actuator_faults: each("actuator", &given.actuator, |fault, key| {
-            let found = fault.actuator_fault(&names.inputs)?;
-            begins(key, found.from);
-            Ok(found)
-        })?,
-        mode_delay: delay("scenario.plant.mode_delay", given.mode_delay)? as u64,
-        told: told?,
-    })
+    let mut deviation = Deviation::default();
+    deviation.input_gain = input_gain;
+    deviation.sensor_delay = delay("scenario.plant.sensor_delay", given.sensor_delay)?;
+    deviation.loads = each("loads", &given.loads, |load, key| {
+        let found = self::load(load, &names)?;
+        begins(key, found.from);
+        Ok(found)
+    })?;
+    deviation.actuator_faults = each("actuator", &given.actuator, |fault, key| {
+        let found = fault.actuator_fault(&names.inputs)?;
+        begins(key, found.from);
+        Ok(found)
+    })?;
+    deviation.mode_delay = delay("scenario.plant.mode_delay", given.mode_delay)? as u64;
+    deviation.told = told?;
+    Ok(deviation)
 }
 
 /// What modes are called.

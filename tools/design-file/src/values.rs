@@ -1,4 +1,8 @@
 //! Values that may be written in more than one way.
+#![expect(
+    clippy::exhaustive_enums,
+    reason = "the ways to write a value in a design file"
+)]
 
 use crate::check::{self, ValueError};
 use crate::{sentence, suggest};

@@ -45,6 +45,7 @@ pub enum Ran {
 /// The command that calls [`compare`] in a process of its own, so that a binary that crashes or hangs
 /// takes nothing with it. The FMU's path is appended, and what is printed is [`Ran`] as JSON.
 #[derive(Clone, Debug)]
+#[expect(clippy::exhaustive_structs, reason = "a command")]
 pub struct Runner(pub Vec<OsString>);
 
 impl Runner {

@@ -27,6 +27,7 @@ pub enum CertificateError {
 /// The certificate of the design beside which it lies. Plant, gains and observer stand in the design alone.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
+#[non_exhaustive]
 pub struct Certificate {
     /// Layout version.
     pub format: u32,

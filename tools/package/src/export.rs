@@ -85,6 +85,10 @@ struct Exporter<'a> {
 
 /// What to write, and from what.
 #[derive(Clone, Debug)]
+#[expect(
+    clippy::exhaustive_structs,
+    reason = "whoever exports must choose each of them"
+)]
 pub struct Options {
     /// Directory to write to; made if it does not exist.
     pub out: PathBuf,

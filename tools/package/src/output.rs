@@ -26,6 +26,7 @@ const ASIDE: &str = ".replaced";
 /// Why an output directory did not get its files.
 #[derive(Debug, thiserror::Error)]
 #[error("{}: {what}", directory.display())]
+#[non_exhaustive]
 pub struct Error {
     /// The output directory.
     pub directory: PathBuf,

@@ -41,6 +41,10 @@ impl Refusal {
 
 /// What is looked at beyond the proof.
 #[derive(Default)]
+#[expect(
+    clippy::exhaustive_structs,
+    reason = "whoever verifies must choose each of them"
+)]
 pub struct Checks {
     /// The key that must have signed the FMU.
     pub key: Option<VerifyingKey>,

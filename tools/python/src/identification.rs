@@ -88,18 +88,13 @@ pub fn identify(
                 .iter()
                 .map(|mode| mode.checked_sub(1))
                 .collect::<Option<Vec<_>>>();
-            Ok(Log {
-                inputs: matrix(&inputs)?,
-                outputs: matrix(&outputs)?,
-                modes: modes.ok_or_else(|| PyValueError::new_err("modes are numbered from 1"))?,
-            })
+            Ok(Log::new(matrix(&inputs)?, matrix(&outputs)?)
+                .in_modes(modes.ok_or_else(|| PyValueError::new_err("modes are numbered from 1"))?))
         })
         .collect::<PyResult<_>>()?;
-    let settings = Settings {
-        order,
-        periods,
-        ..Settings::default()
-    };
+    let mut settings = Settings::default();
+    settings.order = order;
+    settings.periods = periods;
     let found = wait(py, &|| "identifying".into(), None, move || {
         ftc_identify::identify(&logs, &settings)
     })?;

@@ -5,6 +5,7 @@ use ftc_design::Design;
 
 /// Which of the two FMUs is spoken of.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[expect(clippy::exhaustive_enums, reason = "controller and plant")]
 pub enum Side {
     /// The controller.
     Controller,

@@ -1,4 +1,9 @@
 //! What a figure shows, before anything is drawn.
+#![expect(
+    clippy::exhaustive_structs,
+    clippy::exhaustive_enums,
+    reason = "what a page can draw, for the programs of this workspace"
+)]
 
 pub use super::decimate::Point;
 

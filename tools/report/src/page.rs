@@ -1,4 +1,9 @@
 //! A page made of blocks.
+#![expect(
+    clippy::exhaustive_structs,
+    clippy::exhaustive_enums,
+    reason = "what a page can show, for the programs of this workspace"
+)]
 
 use super::figure::Figure;
 use super::svg;

@@ -15,6 +15,7 @@ use std::fmt::Write as _;
 use std::io::{self, Write};
 
 /// Everything that `simulate` writes beside the samples, and what it says.
+#[non_exhaustive]
 pub struct Simulation {
     /// Name and contents of every file.
     pub files: Vec<(String, Vec<u8>)>,

@@ -4,13 +4,11 @@ use super::figure::{Figure, Mark, Series};
 use super::page::{Column, KeyNumber, Page, Row, Section, Table};
 use super::simulate::{Extent, SimulateError, TableOfSamples};
 use super::{Digest, demo, svg};
-use ftc_control::parameters::{
-    Compensation, Estimator, EstimatorMethod, FeedbackGains, Observer, ObserverKind, StateFeedback,
-};
+use ftc_control::parameters::{Compensation, Estimator, FeedbackGains, Observer, StateFeedback};
 use ftc_control::{Controller, Matrix};
 use ftc_design::{ControllerDesign, Design, Signal, Signals};
 use ftc_plant::scenario::{FaultEvent, FaultKind, ModeInterval, Waveform};
-use ftc_plant::{Mode, OperatingPoint, Scenario, SwitchedPlant};
+use ftc_plant::{Mode, Scenario, SwitchedPlant};
 use ftc_simulate::{PlantSimulator, Variant, run};
 use nalgebra::DMatrix;
 use proptest::prelude::*;
@@ -24,9 +22,10 @@ const HOSTILE: &str = "<script>alert(1)</script> & \"y'\" ]]> \u{1}";
 
 fn signals(count: usize, symbol: &str, unit: Option<&str>) -> Vec<Signal> {
     (1..=count)
-        .map(|index| Signal {
-            unit: unit.map(String::from),
-            ..Signal::new(&format!("{symbol}[{index}]"))
+        .map(|index| {
+            let mut signal = Signal::new(&format!("{symbol}[{index}]"));
+            signal.unit = unit.map(String::from);
+            signal
         })
         .collect()
 }
@@ -44,79 +43,34 @@ fn paper(noise: f64) -> Design {
 fn lags(outputs: usize, disturbances: usize, steps: u64) -> Design {
     let square = DMatrix::identity(outputs, outputs);
     let diagonal = |value: f64| Matrix::identity(outputs).scaled(value);
-    let mode = |pole: f64| Mode {
-        name: String::new(),
-        a: &square * pole,
-        b: &square * (1.0 - pole),
-        c: square.clone(),
-        e: DMatrix::from_element(outputs, disturbances, 0.1),
-        f: DMatrix::zeros(outputs, disturbances),
-        operating_point: OperatingPoint::zero(outputs, outputs, outputs),
+    let mode = |pole: f64| {
+        Mode::new(&square * pole, &square * (1.0 - pole), square.clone()).with_disturbance(
+            DMatrix::from_element(outputs, disturbances, 0.1),
+            DMatrix::zeros(outputs, disturbances),
+        )
     };
-    let gains = FeedbackGains {
-        state_feedback: diagonal(-0.1),
-        integral: diagonal(0.2),
-        feedforward: Matrix::zeros(outputs, 0),
-        previous_input: Matrix::zeros(outputs, 0),
-        anti_windup: diagonal(0.0),
-        output_feedback: diagonal(-0.1),
-    };
-    let plant = SwitchedPlant {
-        sample_time: 0.01,
-        modes: vec![mode(0.5), mode(0.7)],
-    };
+    let gains = FeedbackGains::new(diagonal(-0.1), diagonal(0.2), diagonal(-0.1));
+    let plant = SwitchedPlant::new(0.01, vec![mode(0.5), mode(0.7)]);
     let at = |time: f64| time * steps as f64 * 0.01;
-    let signals = Signals {
-        inputs: signals(outputs, "u", Some("V")),
-        outputs: signals(outputs, "y", Some("A")),
-        states: signals(outputs, "x", None),
-        disturbances: Vec::new(),
-    };
-    let controller = ControllerDesign {
-        feedback: StateFeedback {
-            tracked: (0..outputs).collect(),
-            latency: 0,
-            resonators: vec![],
-            transfer: None,
-            modes: vec![gains; 2],
-        },
-        observer: Observer {
-            kind: ObserverKind::Luenberger,
-            note: Some("no disturbance to decouple".into()),
-            gains: vec![diagonal(0.4); 2],
-            decoupling: vec![vec![diagonal(0.0); 2]; 2],
-            lost: Vec::new(),
-            minimum_dwell: 0,
-        },
-        estimator: Estimator {
-            method: EstimatorMethod::None,
-            hypotheses: None,
-            response_length: 0,
-            window: 0,
-            predictors: vec![],
-            adapt: false,
-            harmonics: None,
-            harmonic_transfers: vec![],
-            thresholds: vec![0.1; outputs],
-            debounce: 1,
-            stuck_after: 0,
-            leverage_limit: 100.0,
-            largest_fault: vec![1e6; outputs],
-        },
-        compensation: Compensation::None,
-    };
-    let scenario = Scenario {
+    let signals = Signals::new(
+        signals(outputs, "u", Some("V")),
+        signals(outputs, "y", Some("A")),
+        signals(outputs, "x", None),
+    );
+    let mut observer = Observer::luenberger(vec![diagonal(0.4); 2]);
+    observer.note = Some("no disturbance to decouple".into());
+    let mut estimator = Estimator::none(outputs);
+    estimator.thresholds = vec![0.1; outputs];
+    estimator.largest_fault = vec![1e6; outputs];
+    let controller = ControllerDesign::new(
+        StateFeedback::new((0..outputs).collect(), vec![gains; 2]),
+        observer,
+        estimator,
+        Compensation::None,
+    );
+    let mut scenario = Scenario::new(
         steps,
-        noise: vec![0.02; outputs],
-        seed: 7,
-        schedule: vec![
-            ModeInterval { from: 0.0, mode: 0 },
-            ModeInterval {
-                from: at(0.5),
-                mode: 1,
-            },
-        ],
-        reference: vec![
+        vec![
             Waveform::Square {
                 amplitude: 1.0,
                 period: at(0.4),
@@ -124,23 +78,32 @@ fn lags(outputs: usize, disturbances: usize, steps: u64) -> Design {
             };
             outputs
         ],
-        fault: vec![Waveform::ZERO; outputs],
-        events: vec![FaultEvent {
-            sensor: outputs - 1,
-            from: at(0.6),
-            until: at(0.8),
-            kind: FaultKind::Dropout,
-        }],
-        disturbance: vec![
-            Waveform::Sine {
-                amplitude: 1.0,
-                period: at(0.2),
-                phase: 0.0,
-                offset: 0.0
-            };
-            disturbances
-        ],
-    };
+        plant.dimensions(),
+    );
+    scenario.noise = vec![0.02; outputs];
+    scenario.seed = 7;
+    scenario.schedule = vec![
+        ModeInterval { from: 0.0, mode: 0 },
+        ModeInterval {
+            from: at(0.5),
+            mode: 1,
+        },
+    ];
+    scenario.events = vec![FaultEvent {
+        sensor: outputs - 1,
+        from: at(0.6),
+        until: at(0.8),
+        kind: FaultKind::Dropout,
+    }];
+    scenario.disturbance = vec![
+        Waveform::Sine {
+            amplitude: 1.0,
+            period: at(0.2),
+            phase: 0.0,
+            offset: 0.0
+        };
+        disturbances
+    ];
     Design::new("lags", plant, signals, controller, scenario)
 }
 

@@ -307,6 +307,7 @@ fn of_run(design: &Design, calmer: &str, warning: &RunWarning) -> String {
             mode,
             radius,
             model,
+            ..
         }) => format!(
             "the true plant is unstable in mode {} ({}): the spectral radius of its A is {radius:.4}, that of the \
              model's {model:.4}; errors of the entries of a sampled A can do that: lower them, or give the true \

@@ -146,10 +146,11 @@ impl Designs {
             ControllerKind::Proposed | ControllerKind::ToldTheFault | ControllerKind::NoFtc => {
                 self.proposed.parameters()
             }
-            ControllerKind::PrintedCompensation => ControllerParameters {
-                compensation: Compensation::Additive,
-                ..self.proposed.parameters()
-            },
+            ControllerKind::PrintedCompensation => {
+                let mut parameters = self.proposed.parameters();
+                parameters.compensation = Compensation::Additive;
+                parameters
+            }
             ControllerKind::AdditiveReference => self.additive.parameters(),
             ControllerKind::AdditiveSliding => self.sliding.parameters(),
         }

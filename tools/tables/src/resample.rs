@@ -2,6 +2,7 @@
 
 /// What a signal is between two of its times.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[expect(clippy::exhaustive_enums, reason = "as a design file names them")]
 pub enum Interpolation {
     /// What it was at the earlier one.
     #[default]

@@ -37,6 +37,7 @@ pub struct Table {
 
 /// Where a row stands in its file.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
 pub struct Place {
     /// Below the header, from 1.
     pub row: usize,

@@ -15,7 +15,7 @@ use fmu_host::model::example;
 use fmu_host::{Functions, Instance, Library, Loop, Model};
 
 /// Both binaries and both models of the example.
-pub struct Pair {
+pub(crate) struct Pair {
     pub libraries: [Library; 2],
     pub models: [Model; 2],
 }

@@ -17,6 +17,7 @@ use crate::kernel;
 
 /// A small change of what a tick is told.
 #[derive(Clone, Copy, Debug)]
+#[expect(clippy::exhaustive_structs, reason = "the inputs of a tick")]
 pub struct Change<'a> {
     /// `dy` (p).
     pub measurement: &'a [f64],

@@ -4,6 +4,10 @@ use serde::{Deserialize, Serialize};
 
 /// What one sample says of one sensor.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[expect(
+    clippy::exhaustive_enums,
+    reason = "below, above, or not to be compared"
+)]
 pub enum Verdict {
     /// The residual is within its threshold.
     Healthy,

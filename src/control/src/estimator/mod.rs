@@ -10,6 +10,7 @@ mod adaptation;
 mod decision;
 mod derivative;
 mod harmonics;
+#[expect(clippy::exhaustive_structs, reason = "made by the estimator alone")]
 pub mod hypotheses;
 mod least_squares;
 mod predictor;
@@ -66,6 +67,10 @@ impl Trust {
 
 /// One sample as the estimator sees it.
 #[derive(Clone, Copy, Debug)]
+#[expect(
+    clippy::exhaustive_structs,
+    reason = "made anew in each tick, by the controller alone"
+)]
 pub struct Observation<'a> {
     /// Number of the tick.
     pub tick: u64,

@@ -78,6 +78,7 @@ pub struct Problem {
 
 /// What the solver returned, not yet verified.
 #[derive(Clone, Debug)]
+#[non_exhaustive]
 pub struct Candidate {
     /// The scalars of the problem, to be read through [`Variable::value`].
     pub scalars: Vec<f64>,

@@ -292,9 +292,8 @@ impl Found {
         let outward: Vec<f64> = units.states.iter().map(|unit| 1.0 / unit).collect();
         let inward: Vec<f64> = units.outputs.iter().map(|unit| 1.0 / unit).collect();
         let physical = |gain: &DMatrix<f64>| plain(&scaled(gain, &outward, &inward));
-        let set = |(sensors, gains): (Vec<usize>, Vec<DMatrix<f64>>)| LostSet {
-            sensors,
-            correction: gains.iter().map(physical).collect(),
+        let set = |(sensors, gains): (Vec<usize>, Vec<DMatrix<f64>>)| {
+            LostSet::new(sensors, gains.iter().map(physical).collect())
         };
         let mut found = design.clone();
         found.observer.lost = self.sets.into_iter().map(set).collect();

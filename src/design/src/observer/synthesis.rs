@@ -340,17 +340,13 @@ impl Parts {
         note: Option<String>,
     ) -> Result<ObserverDesign, DesignError> {
         let wrap = |row: Vec<DMatrix<f64>>| row.iter().map(plain).collect();
+        let decoupling = self.decoupling.into_iter().map(wrap).collect();
+        let mut observer = Observer::new(kind, wrap(self.gains), decoupling);
+        observer.note = note;
         let mut found = ObserverDesign {
             spec: spec.clone(),
             spectral_radius: self.radius,
-            observer: Observer {
-                kind,
-                note,
-                gains: wrap(self.gains),
-                decoupling: self.decoupling.into_iter().map(wrap).collect(),
-                lost: Vec::new(),
-                minimum_dwell: 0,
-            },
+            observer,
             dwell: None,
             certificate: ObserverCertificate {
                 states: units.states.clone(),
@@ -425,14 +421,11 @@ impl Candidate {
             .collect::<Option<_>>()?;
         let none = DMatrix::zeros(filters[0].a.nrows(), filters[0].c.nrows());
         Some(Self {
-            observer: Observer {
-                kind: ObserverKind::Kalman,
-                note: None,
-                gains: vec![plain(&none); filters.len()],
-                decoupling: vec![gains; filters.len()],
-                lost: Vec::new(),
-                minimum_dwell: 0,
-            },
+            observer: Observer::new(
+                ObserverKind::Kalman,
+                vec![plain(&none); filters.len()],
+                vec![gains; filters.len()],
+            ),
             ratio,
             ready: None,
         })

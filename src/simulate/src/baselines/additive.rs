@@ -3,7 +3,7 @@
 use ftc_control::ControllerParameters;
 use ftc_control::parameters::Compensation;
 use ftc_design::derived::feedback;
-use ftc_design::{ControlSpec, Design, DesignError, Objective, RequestError, state_feedback};
+use ftc_design::{Design, DesignError, Objective, RequestError, state_feedback};
 
 /// The same controller with the gains of T1 (decay only, no attenuation of the disturbance) and
 /// the additive control as printed in place of the design's compensation.
@@ -15,10 +15,8 @@ pub fn additive(design: &Design) -> Result<ControllerParameters, DesignError> {
     let synthesis = design
         .synthesis()
         .ok_or(DesignError::Request(RequestError::NotSynthesised))?;
-    let spec = ControlSpec {
-        objective: Objective::Decay,
-        ..synthesis.state_feedback.spec
-    };
+    let mut spec = synthesis.state_feedback.spec;
+    spec.objective = Objective::Decay;
     let ours = &design.controller.feedback;
     let plant = &design.plant;
     let control = state_feedback::synthesise(plant, &spec, &design.signals.scaling())?;

@@ -66,24 +66,22 @@ pub fn response_delay(plant: &SwitchedPlant, output: usize) -> usize {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use ftc_plant::OperatingPoint;
     use nalgebra::{DMatrix, dmatrix};
 
     /// A chain of three delays: the first state is reached after three samples, the last after one.
     #[test]
     fn a_chain_of_delays_is_counted() {
-        let plant = SwitchedPlant {
-            sample_time: 1.0,
-            modes: vec![Mode {
-                name: "chain".into(),
-                a: dmatrix![0.0, 1.0, 0.0; 0.0, 0.0, 1.0; 0.0, 0.0, 0.0],
-                b: dmatrix![0.0; 0.0; 1.0],
-                c: DMatrix::identity(3, 3),
-                e: DMatrix::zeros(3, 0),
-                f: DMatrix::zeros(3, 0),
-                operating_point: OperatingPoint::zero(3, 1, 3),
-            }],
-        };
+        let plant = SwitchedPlant::new(
+            1.0,
+            vec![
+                Mode::new(
+                    dmatrix![0.0, 1.0, 0.0; 0.0, 0.0, 1.0; 0.0, 0.0, 0.0],
+                    dmatrix![0.0; 0.0; 1.0],
+                    DMatrix::identity(3, 3),
+                )
+                .named("chain"),
+            ],
+        );
         assert_eq!(
             [0, 1, 2].map(|output| response_delay(&plant, output)),
             [3, 2, 1]

@@ -452,24 +452,22 @@ fn kalman(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use ftc_plant::OperatingPoint;
     use proptest::prelude::*;
 
     const HORIZON: usize = 12;
 
     fn plant(entries: &[f64]) -> SwitchedPlant {
-        SwitchedPlant {
-            sample_time: 1.0,
-            modes: vec![Mode {
-                name: "only".into(),
-                a: DMatrix::from_row_slice(2, 2, &entries[..4]),
-                b: DMatrix::from_row_slice(2, 2, &entries[4..8]),
-                c: DMatrix::identity(2, 2),
-                e: DMatrix::zeros(2, 0),
-                f: DMatrix::zeros(2, 0),
-                operating_point: OperatingPoint::zero(2, 2, 2),
-            }],
-        }
+        SwitchedPlant::new(
+            1.0,
+            vec![
+                Mode::new(
+                    DMatrix::from_row_slice(2, 2, &entries[..4]),
+                    DMatrix::from_row_slice(2, 2, &entries[4..8]),
+                    DMatrix::identity(2, 2),
+                )
+                .named("only"),
+            ],
+        )
     }
 
     fn spec(limit: f64) -> PredictiveSpec {

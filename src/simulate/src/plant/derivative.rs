@@ -11,6 +11,7 @@ use ftc_plant::scenario::{FaultEvent, FaultKind};
 
 /// Small changes of the plant's inputs.
 #[derive(Clone, Copy, Debug)]
+#[expect(clippy::exhaustive_structs, reason = "the inputs of the plant")]
 pub struct Change<'a> {
     /// Of the command (m).
     pub command: &'a [f64],

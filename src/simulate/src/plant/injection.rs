@@ -9,6 +9,10 @@ const OTHER_SEED: u64 = 0x5eed_0f1a_7e57_ab1e;
 
 /// One fault per sensor (p each); empty: none.
 #[derive(Clone, Copy, Debug, Default)]
+#[expect(
+    clippy::exhaustive_structs,
+    reason = "the four parameters of an injected fault"
+)]
 pub struct Injected<'a> {
     /// What happens to the reading, by number:
     ///

@@ -3,7 +3,7 @@
 
 use ftc_design::{ControlSpec, Run, Solver, state_feedback};
 use ftc_plant::scaling::Scaling;
-use ftc_plant::{Mode, OperatingPoint, SwitchedPlant};
+use ftc_plant::{Mode, SwitchedPlant};
 use nalgebra::dmatrix;
 use std::ffi::{c_char, c_int};
 use std::sync::atomic::{AtomicUsize, Ordering};
@@ -185,26 +185,17 @@ pub unsafe extern "C" fn dgesvd_(
 }
 
 fn main() {
-    let mode = |pole: f64| Mode {
-        name: "mode".into(),
-        a: dmatrix![pole, 0.1; 0.0, 0.5],
-        b: dmatrix![0.0; 1.0],
-        c: dmatrix![1.0, 0.0],
-        e: dmatrix![0.1; 0.0],
-        f: dmatrix![0.0],
-        operating_point: OperatingPoint::zero(2, 1, 1),
+    let mode = |pole: f64| {
+        Mode::new(dmatrix![pole, 0.1; 0.0, 0.5], dmatrix![0.0; 1.0], dmatrix![1.0, 0.0])
+            .with_disturbance(dmatrix![0.1; 0.0], dmatrix![0.0])
     };
-    let plant = SwitchedPlant {
-        sample_time: 1.0,
-        modes: vec![mode(0.9), mode(0.8)],
-    };
-    let spec = ControlSpec {
-        decay: 0.98,
-        ..ControlSpec::unweighted(plant.dimensions())
-    };
+    let plant = SwitchedPlant::new(1.0, vec![mode(0.9), mode(0.8)]);
+    let mut spec = ControlSpec::unweighted(plant.dimensions());
+    spec.decay = 0.98;
     let scaling = Scaling::automatic(&plant);
     // The structured solver needs no BLAS; the general one does.
-    let run = Run { solver: Solver::General, ..Run::default() };
+    let mut run = Run::default();
+    run.solver = Solver::General;
     let control = state_feedback::synthesise_with(&plant, &spec, &scaling, &run).expect("the plant is easy");
     control.verify(&plant).expect("it is proved");
     let calls = CALLS.load(Ordering::Relaxed);

@@ -48,6 +48,7 @@ impl Intervals {
 
 /// How well faults were found.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[non_exhaustive]
 pub struct Alarms {
     /// Faults that set in, over all sensors.
     pub onsets: usize,

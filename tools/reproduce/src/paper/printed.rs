@@ -101,16 +101,11 @@ pub fn doubled_disturbance() -> Result<DoubledDisturbance, Error> {
                     .collect::<Vec<_>>(),
             )
         };
-        Mode {
-            e: beside(&mode.e, &silent),
-            f: beside(&silent, &(-&mode.e / te)),
-            ..mode.clone()
-        }
+        let e = beside(&mode.e, &silent);
+        let f = beside(&silent, &(-&mode.e / te));
+        mode.clone().with_disturbance(e, f)
     };
-    let doubled = SwitchedPlant {
-        sample_time: te,
-        modes: plant.modes.iter().map(double).collect(),
-    };
+    let doubled = SwitchedPlant::new(te, plant.modes.iter().map(double).collect());
     Ok(DoubledDisturbance {
         sound: largest(&sound.gamma).unwrap_or(f64::NAN),
         printed: synthesise(&doubled, &control)
@@ -146,12 +141,10 @@ pub fn latency() -> Result<Latency, Error> {
     let gains = prompt.for_controller(&plant).modes;
     let ignored = plant.modes.iter().zip(&gains);
     let delayed = |lyapunov| {
-        let spec = ControlSpec {
-            latency: 1,
-            decay: DECAY,
-            lyapunov,
-            ..control.clone()
-        };
+        let mut spec = control.clone();
+        spec.latency = 1;
+        spec.decay = DECAY;
+        spec.lyapunov = lyapunov;
         match synthesise(&plant, &spec) {
             Ok(feedback) => Ok(Some(feedback)),
             Err(DesignError::Infeasible(_)) => Ok(None),
