@@ -17,6 +17,10 @@ const SHARE_UNJUDGED: f64 = 0.25;
 const SHARE_SATURATED: f64 = 0.05;
 /// Share of the samples of a run in which a fault estimate may stand at its largest size without a warning.
 const SHARE_CAPPED: f64 = 0.01;
+/// A fault is large where it exceeds so many thresholds of its sensor.
+const LARGE_FAULT: f64 = 3.0;
+/// Share of the samples with a large fault in which it may go unnoticed without a warning.
+const SHARE_UNNOTICED: f64 = 0.5;
 /// Standard deviation of a command's noise, relative to its range, without a warning.
 const COMMAND_NOISE: f64 = 0.1;
 
@@ -54,6 +58,15 @@ pub enum RunWarning {
         share: f64,
         /// That size in physical units.
         size: f64,
+    },
+    /// A sensor was mostly believed while its fault was large.
+    Unnoticed {
+        /// The sensor, from 0.
+        sensor: usize,
+        /// Share of the samples with a large fault in which it was believed, 0 to 1.
+        share: f64,
+        /// The largest fault that was believed, in physical units.
+        largest: f64,
     },
     /// The noise of the sensors alone moves a command by a large part of its range.
     NoisyCommand {
@@ -94,6 +107,8 @@ pub struct RunWatch<'a> {
     saturated: Vec<usize>,
     /// Samples in which the estimate of each sensor's fault stands at its largest size.
     capped: Vec<usize>,
+    /// What came of each sensor's large faults.
+    large: Vec<LargeFault>,
     held: Held,
     /// What lay outside the healthy database.
     outside: OutsideDatabase<'a>,
@@ -113,6 +128,7 @@ impl<'a> RunWatch<'a> {
             samples: 0,
             saturated: vec![0; design.signals.inputs.len()],
             capped: vec![0; design.controller.estimator.authority().len()],
+            large: vec![LargeFault::default(); design.signals.outputs.len()],
             held: Held::default(),
             outside: OutsideDatabase::new(design),
             diodes: diodes.map(DiodesConduct::new),
@@ -135,6 +151,10 @@ impl<'a> RunWatch<'a> {
         let sizes = self.design.controller.estimator.authority().iter();
         for (count, (&size, fault)) in self.capped.iter_mut().zip(sizes.zip(&record.f_hat)) {
             *count += usize::from(fault.abs() >= size);
+        }
+        let thresholds = &self.design.controller.estimator.thresholds;
+        for (sensor, (large, &threshold)) in self.large.iter_mut().zip(thresholds).enumerate() {
+            large.see(record, sensor, threshold);
         }
         self.held
             .see(&self.design.controller.estimator, record.mode);
@@ -164,6 +184,7 @@ pub fn of_runs(design: &Design, runs: &[(RunWatch<'_>, Option<u64>)]) -> Vec<Run
         .chain(ftc().flat_map(unjudged))
         .chain(ftc().flat_map(saturated))
         .chain(ftc().flat_map(capped))
+        .chain(ftc().flat_map(unnoticed))
         .chain(noisy_commands(design))
         .chain(stopped)
         .chain(diodes)
@@ -200,6 +221,48 @@ fn capped(run: &RunWatch<'_>) -> Vec<RunWarning> {
             size,
         })
         .collect()
+}
+
+/// Sensors that were mostly believed while their faults were large.
+fn unnoticed(run: &RunWatch<'_>) -> Vec<RunWarning> {
+    if run.design.controller.estimator.method == EstimatorMethod::None {
+        return Vec::new();
+    }
+    let sensors = run.large.iter().enumerate();
+    sensors
+        .filter(|(_, large)| run.share(large.samples) > SHARE_CAPPED)
+        .map(|(sensor, large)| RunWarning::Unnoticed {
+            sensor,
+            share: large.believed as f64 / large.samples as f64,
+            largest: large.largest,
+        })
+        .filter(|warning| matches!(warning, RunWarning::Unnoticed { share, .. } if *share > SHARE_UNNOTICED))
+        .collect()
+}
+
+/// What came of a sensor's large faults.
+#[derive(Clone, Copy, Debug, Default)]
+struct LargeFault {
+    /// Samples with one.
+    samples: usize,
+    /// Those in which the sensor was believed.
+    believed: usize,
+    /// The largest that was believed.
+    largest: f64,
+}
+
+impl LargeFault {
+    fn see(&mut self, record: &Record, sensor: usize, threshold: f64) {
+        let fault = record.fault[sensor].abs();
+        if !(fault.is_finite() && fault > LARGE_FAULT * threshold) {
+            return;
+        }
+        self.samples += 1;
+        if !record.flagged[sensor] {
+            self.believed += 1;
+            self.largest = self.largest.max(fault);
+        }
+    }
 }
 
 /// Commands that the noise of the sensors moves by a large part of their range (or nominal value).

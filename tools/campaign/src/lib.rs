@@ -34,7 +34,7 @@ const BATCH: u64 = 256;
 
 /// What is drawn in each run.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(default)]
+#[serde(default, deny_unknown_fields)]
 #[non_exhaustive]
 pub struct Options {
     /// Seed of the campaign.

@@ -67,6 +67,11 @@ def real(values: object, key: str, where: str = "") -> np.ndarray:
     return np.array(np.real(values), dtype=float)
 
 
+def count(number: int, what: str) -> str:
+    """Returns a number of things, as "1 mode" or "2 modes"."""
+    return f"{number} {what}{'' if number == 1 else 's'}"
+
+
 def whole(value: object, key: str, least: int) -> int:
     """Returns a whole number that is at least so large.
 

@@ -43,6 +43,28 @@ class Matrices:
         n, m = self.B.shape
         return replace(self, A=np.array(A).reshape(n, n), B=np.array(B).reshape(n, m), dt=sample_time)
 
+    def named_as(self, first: Matrices) -> Matrices:
+        """Returns the model with the first model's names where it has none of its own.
+
+        Raises:
+            DesignFileError: It has the same names in another order.
+        """
+        kinds = ("inputs", "outputs", "states")
+        for kind in kinds:
+            mine, others = getattr(self, kind), getattr(first, kind)
+            if mine and others and mine != others and sorted(mine) == sorted(others):
+                raise DesignFileError(
+                    f"{self.where} has the {kind} {', '.join(mine)}, {first.where} {', '.join(others)}: "
+                    "give them in one order",
+                    self.where,
+                )
+        return replace(self, **{kind: getattr(self, kind) or getattr(first, kind) for kind in kinds})
+
+
+def is_model(system: object) -> bool:
+    """Whether something holds state-space matrices under their names."""
+    return all(hasattr(system, name) for name in "ABCD")
+
 
 def matrices(system: Any, where: str, *, continuous: bool) -> Matrices:  # noqa: ANN401  (duck typing is the point)
     """Returns the matrices of a model.
@@ -57,10 +79,11 @@ def matrices(system: Any, where: str, *, continuous: bool) -> Matrices:  # noqa:
     """
     if isinstance(system, tuple | list):
         return _checked(_from_arrays(system, where, continuous=continuous))
-    if not all(hasattr(system, name) for name in "ABCD"):
+    if not is_model(system):
+        transfer = " (control.ss(...) and .to_ss() of SciPy make one)" if hasattr(system, "num") else ""
         raise DesignFileError(
-            f"{where} is of type {type(system).__name__}: give a control.StateSpace, a scipy.signal.StateSpace "
-            "or arrays (A, B, C, D)",
+            f"{where} is of type {type(system).__name__}: give a control.StateSpace, a scipy.signal.StateSpace"
+            f"{transfer} or arrays (A, B, C, D)",
             where,
         )
     # python-control: 0 continuous, True discrete at an unsaid sample time, None unsaid;

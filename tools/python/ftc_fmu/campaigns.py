@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ftc_fmu import _core
-from ftc_fmu._plain import plain, whole
+from ftc_fmu._plain import count, plain, whole
 from ftc_fmu.design import Design, listener
 from ftc_fmu.errors import DesignFileError, FtcError, extra
 
@@ -17,6 +17,16 @@ if TYPE_CHECKING:
 
     from distributed import Client
 
+# What the rows of the summary are, as in the command line's table.
+ROWS = {
+    "error": "true error with fault tolerance",
+    "error_told": "true error told the fault",
+    "error_without": "true error without",
+    "over_told": "with, over told",
+    "over_none": "with, over without",
+    "healthy_error": "true error with, no fault",
+    "healthy_over_none": "with, over without, no fault",
+}
 # Shards per thread of a cluster: enough that a slow or lost worker delays little.
 SHARDS_PER_THREAD = 4
 # How often a shard is given to another worker when its worker dies.
@@ -54,12 +64,16 @@ class Campaign:
         paths[1].write_text(self._repr_html_(), encoding="utf-8")
         return paths
 
+    def __repr__(self) -> str:
+        """Returns one line: the design and the runs."""
+        return f"<ftc_fmu.Campaign of {self._design.name}: {count(self.runs, 'run')}>"
+
     def __str__(self) -> str:
         """Returns the figures a person looks at first."""
         lines = [f"{self._design.name}: {self.runs} random runs"]
         for key, quantiles in self.report["summary"].items():
             shown = ", ".join(f"{name} {value:.4g}" for name, value in quantiles.items() if value is not None)
-            lines.append(f"  {key.replace('_', ' ')}: {shown}")
+            lines.append(f"  {ROWS.get(key, key)}: {shown}")
         return "\n".join(lines)
 
     def _repr_html_(self) -> str:

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ftc_fmu._plain import real, whole
+from ftc_fmu._plain import count, real, whole
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
@@ -39,6 +39,11 @@ class Controller:
             ValueError: One sentence about a wrong size or mode.
         """
         return np.array(self._core.step(_vector(y, "y"), _vector(y_ref, "y_ref"), whole(mode, "mode", 0)))
+
+    def __repr__(self) -> str:
+        """Returns one line: sizes and whether estimated faults are taken out."""
+        sizes = f"{count(len(self.f_hat), 'sensor')}, {count(len(self.u), 'command')}"
+        return f"<ftc_fmu.Controller: {sizes}, ftc_enabled={self.ftc_enabled}>"
 
     @property
     def u(self) -> np.ndarray:

@@ -10,14 +10,14 @@ from typing import TYPE_CHECKING, Any
 
 from ftc_fmu import _core
 from ftc_fmu._place import HOME
-from ftc_fmu._plain import plain, table, to_toml, whole
+from ftc_fmu._plain import count, plain, table, to_toml, whole
 from ftc_fmu.controller import Controller
 from ftc_fmu.errors import DesignFileError
 from ftc_fmu.log import Log
 from ftc_fmu.run import Run
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping, Sequence
+    from collections.abc import Callable, Iterator, Mapping, Sequence
     from os import PathLike
 
     from ftc_fmu.plant import Plant
@@ -65,14 +65,14 @@ class Design:
         return to_toml(self.document)
 
     def save(self, path: str | PathLike[str]) -> Path:
-        """Writes the design file and, beside it, the logs that it names.
+        """Writes the design file and, beside it, the files that it names: matrices, logs and tables.
 
         Returns:
             The path of the design file.
         """
         path = Path(path)
         path.parent.mkdir(parents=True, exist_ok=True)
-        for file in _logs(self.document):
+        for file in _files(self.document):
             source, target = self._folder / file, path.parent / file
             if source.exists() and source.resolve() != target.resolve():
                 target.parent.mkdir(parents=True, exist_ok=True)
@@ -114,6 +114,8 @@ class Design:
     ) -> list[Path]:
         """Writes NAME_controller.fmu and NAME_plant.fmu, and with `ssp` the package of both.
 
+        The plant FMU plays the design's own scenario, not one that was given to `simulate`.
+
         Args:
             out: Folder; made where there is none.
             fmi: Version of the interface; only "2.0" is there.
@@ -148,8 +150,8 @@ class Design:
 
     def __repr__(self) -> str:
         """Returns one line: name, modes, gains."""
-        gammas = self.report.get("gamma") or []
-        return f"<ftc_fmu.Design {self.name}: {len(gammas) or 'some'} modes, gamma {gammas}>"
+        modes = self.document.get("mode") or self.report.get("gamma") or []
+        return f"<ftc_fmu.Design {self.name}: {count(len(modes), 'mode')}, gamma {self.report.get('gamma')}>"
 
     def _repr_html_(self) -> str:
         """Shows the report in a notebook."""
@@ -201,7 +203,7 @@ def design(
     if control:
         document["controller"] = plain(control, "controller")
     document |= {key: plain(entries, key) for key, entries in tables.items()}
-    core = _core.solve(to_toml(document), str(folder), None, listener(progress), threads)
+    core = _core.solve(to_toml(document), str(folder), None, listener(progress), whole(threads, "threads", 1))
     return Design(core, document, folder)
 
 
@@ -220,7 +222,7 @@ def load(path: str | PathLike[str], *, progress: Progress = None, threads: int =
     """
     path = Path(path)
     text = _core.read_text(str(path))
-    core = _core.solve(text, str(path.parent), str(path), listener(progress), threads)
+    core = _core.solve(text, str(path.parent), str(path), listener(progress), whole(threads, "threads", 1))
     return Design(core, tomllib.loads(text.removeprefix("\ufeff")), path.parent)
 
 
@@ -280,8 +282,21 @@ def _with_logs(tables: dict[str, Any]) -> tuple[Path, dict[str, Any]]:
     return folder, tables | {"estimator": {**estimator, "database": files}}
 
 
-def _logs(document: dict[str, Any]) -> list[str]:
-    """Files that a design file names: its logs."""
+def _files(document: dict[str, Any]) -> list[str]:
+    """Files that a design file names: matrices of modes, logs, tables of a scenario."""
     database = document.get("estimator", {}).get("database")
-    files = [database] if isinstance(database, str) else database or []
-    return [file for file in files if file not in ("commission", "model")]
+    logs = [database] if isinstance(database, str) else database or []
+    return [file for file in logs if file not in ("commission", "model")] + list(
+        _named([document.get("mode"), document.get("scenario")])
+    )
+
+
+def _named(value: object) -> Iterator[str]:
+    """Every text under a key `file`, however deep."""
+    if isinstance(value, dict):
+        if isinstance(value.get("file"), str):
+            yield value["file"]
+        value = list(value.values())
+    if isinstance(value, list):
+        for item in value:
+            yield from _named(item)

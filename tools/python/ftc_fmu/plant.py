@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ftc_fmu._plain import plain, real
-from ftc_fmu._systems import Matrices, matrices
+from ftc_fmu._plain import count, plain, real
+from ftc_fmu._systems import Matrices, is_model, matrices
 from ftc_fmu.errors import DesignFileError
 
 if TYPE_CHECKING:
@@ -83,7 +83,7 @@ class Plant:
             (zero-order hold). A single model is a plant of one mode.
         sample_time: Seconds between two samples.
         disturbance_inputs: Columns of B and D (from 0, as NumPy counts), or names of inputs, that
-            nobody commands: they become E and F.
+            nobody commands: they become E and F. A single one needs no list.
         continuous: Whether arrays `(A, B, C, D)` are of a continuous model; models that know it
             themselves need no word.
         inputs: Per command its name, or a table `{"name", "unit", "nominal", "min", "max"}`; or the same
@@ -118,21 +118,28 @@ class Plant:
     ) -> None:
         """Turns every model into a mode."""
         self.sample_time = _positive(sample_time, "sample_time")
-        systems = list(systems) if isinstance(systems, list) else [systems]
+        many = isinstance(systems, list) or (isinstance(systems, tuple) and is_model(systems[0] if systems else None))
+        systems = list(systems) if many else [systems]
         given = [matrices(system, f"systems[{at}]", continuous=continuous) for at, system in enumerate(systems)]
         if not given:
             raise DesignFileError("systems is empty: give one model per mode", "systems")
+        said = {"inputs": inputs, "outputs": outputs, "states": states}
+        for key, entries in said.items():
+            if isinstance(entries, str | Mapping):
+                raise DesignFileError(f"{key} is {entries!r}: give a list with an entry per signal", key)
         names = list(names) if names is not None else [f"mode {number}" for number in range(1, len(given) + 1)]
         points = list(operating_points) if operating_points is not None else [None] * len(given)
         for key, values in (("names", names), ("operating_points", points)):
             if len(values) != len(given):
                 raise DesignFileError(f"{key} has {len(values)} entries: give {len(given)}, one per mode", key)
-        self._disturbance_inputs = list(disturbance_inputs)
+        _one_size(given)
+        one = isinstance(disturbance_inputs, str | int | np.integer)
+        self._disturbance_inputs = [disturbance_inputs] if one else list(disturbance_inputs)
         columns = _names(inputs, given[0].B.shape[1])
         if columns is not None:
             given = [replace(model, inputs=columns) for model in given]
+        given = [model.named_as(given[0]) for model in given]
         self.modes: list[Mode] = [self._mode(*parts) for parts in zip(given, names, points, strict=True)]
-        said = {"inputs": inputs, "outputs": outputs, "states": states}
         self.signals: dict[str, list[dict[str, Any]]] = self._signals(given[0], said)
 
     def __repr__(self) -> str:
@@ -140,8 +147,8 @@ class Plant:
         first = self.modes[0]
         (n, m), p, s = first.B.shape, len(first.C), first.E.shape[1]
         return (
-            f"<ftc_fmu.Plant: {len(self.modes)} modes, {n} states, {m} inputs, {p} outputs, "
-            f"{s} disturbances, {self.sample_time} s>"
+            f"<ftc_fmu.Plant: {count(len(self.modes), 'mode')}, {count(n, 'state')}, {count(m, 'input')}, "
+            f"{count(p, 'output')}, {count(s, 'disturbance')}, {self.sample_time} s>"
         )
 
     def _mode(self, model: Matrices, name: str, point: Mapping[str, Any] | None) -> Mode:
@@ -241,6 +248,19 @@ class Plant:
         from ftc_fmu.identification import identify  # noqa: PLC0415  (that module needs this one)
 
         return identify(logs, order, disturbance)
+
+
+def _one_size(models: Sequence[Matrices]) -> None:
+    """Refuses modes of other sizes than the first's."""
+    sizes = [(model.A.shape[0], model.B.shape[1], model.C.shape[0]) for model in models]
+    for model, size in zip(models, sizes, strict=True):
+        if size != sizes[0]:
+            n, m, p = sizes[0]
+            raise DesignFileError(
+                f"{model.where} has {size[0]} states, {size[1]} inputs and {size[2]} outputs, {models[0].where} "
+                f"{n}, {m} and {p}: give modes of the same signals",
+                model.where,
+            )
 
 
 def _names(inputs: Sequence[str | Mapping[str, Any]] | None, width: int) -> list[str] | None:

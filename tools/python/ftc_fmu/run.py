@@ -11,7 +11,7 @@ import numpy as np
 from ftc_fmu.errors import extra
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Iterator, Sequence
 
     import matplotlib.figure
     import pandas as pd
@@ -114,19 +114,25 @@ class Run:
         dataset["t"].attrs["units"] = "s"
         return dataset
 
-    def plot(self, variants: tuple[str, ...] = ("ftc", "no_ftc")) -> matplotlib.figure.Figure:
+    def plot(self, variants: Sequence[str] = ("ftc", "no_ftc")) -> matplotlib.figure.Figure:
         """Draws the true tracked outputs beside their references, and the faults beside their estimates.
 
         Args:
-            variants: Which variants to draw.
+            variants: Which variants to draw, of those that ran.
 
         Returns:
-            The figure.
+            The figure: a notebook shows it, `savefig` writes it.
+
+        Raises:
+            ValueError: No such variant ran.
         """
-        figures = extra("matplotlib.figure", "matplotlib")
+        pictures = extra("ftc_fmu._picture", "matplotlib")
         tracked, outputs = self._core.tracked(), self._core.outputs()
-        shown = [variant for variant in variants if variant in self.variants]
-        figure = figures.Figure(figsize=(9, 2.4 * (len(tracked) + 1)), layout="constrained")
+        shown = [variants] if isinstance(variants, str) else list(variants)
+        unknown = [variant for variant in shown if variant not in self.variants]
+        if unknown:
+            raise ValueError(f"variants names {unknown[0]!r}: give some of {', '.join(self.variants)}")
+        figure = pictures.Picture(figsize=(9, 2.4 * (len(tracked) + 1)), layout="constrained")
         axes = figure.subplots(len(tracked) + 1, 1, sharex=True)
         t = self["t"]
         for row, (ax, output) in enumerate(zip(axes, tracked, strict=False)):
@@ -143,6 +149,10 @@ class Run:
         axes[-1].set_ylabel("sensor faults")
         axes[-1].set_xlabel("time (s)")
         return figure
+
+    def __repr__(self) -> str:
+        """Returns one line: samples and variants."""
+        return f"<ftc_fmu.Run: {len(self['t'])} samples, {', '.join(self.variants)}>"
 
     def __str__(self) -> str:
         """Returns the table of figures of merit and the warnings that `ftc-fmu simulate` prints."""

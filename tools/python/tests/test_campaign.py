@@ -87,12 +87,15 @@ def test_what_is_written(alone: ftc.Campaign, tmp_path: Path) -> None:
     assert json.loads(counts.read_text())["runs"] == RUNS
     assert "<svg" in page.read_text()
     assert "over told" in str(alone)
+    assert repr(alone) == f"<ftc_fmu.Campaign of paper: {RUNS} runs>"
 
 
 def test_an_option_that_is_unknown_or_out_of_range(paper: ftc.Design) -> None:
     """Is refused before anything is run."""
     with pytest.raises(ftc.DesignFileError, match="model_error is 2"):
         ftc.campaign(paper, runs=10, model_error=2.0)
+    with pytest.raises(ftc.DesignFileError, match=r"unknown field `model_err`, expected one of .*`model_error`"):
+        ftc.campaign(paper, runs=10, model_err=0.1)
     for runs in (0, -1, 1.5, "many"):
         with pytest.raises(ftc.DesignFileError, match=r"runs is .*: give a whole number from 1 on"):
             ftc.campaign(paper, runs=runs)

@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 import pytest
+import tomli_w
 
 import ftc_fmu as ftc
 from conftest import EXAMPLES
@@ -46,8 +47,8 @@ def test_threads_do_not_change_a_design(tmp_path: Path) -> None:
     path.write_text(text.replace('lyapunov = "common"', 'lyapunov = "dwell"'), encoding="utf-8")
     assert "dwell" in path.read_text(encoding="utf-8")
     assert ftc.load(path).record() == ftc.load(path, threads=3).record()
-    with pytest.raises(ftc.DesignFileError, match="threads is 0: give 1 to 1024"):
-        ftc.load(path, threads=0)
+    with pytest.raises(ftc.DesignFileError, match=r"threads is 1025: give 1 to 1024"):
+        ftc.load(path, threads=1025)
 
 
 def program(*arguments: object) -> subprocess.CompletedProcess:
@@ -91,6 +92,25 @@ def test_examples_are_read_and_written(tmp_path: Path) -> None:
     assert again.core.record() == logged.core.record()
 
 
+def test_matrices_and_tables_come_along(tank: ftc.Design, tmp_path: Path) -> None:
+    """What `[[mode]] file` and a signal's `file` name, also from another folder."""
+    document = tank.document | {"mode": [], "scenario": {"steps": 20}}
+    for number, mode in enumerate(tank.document["mode"], 1):
+        named = {key: mode[key] for key in "ABCE" if key in mode}
+        np.savez(tmp_path / f"mode_{number}.npz", **{key: np.array(value) for key, value in named.items()})
+        document["mode"].append({key: value for key, value in mode.items() if key not in named})
+        document["mode"][-1] |= {"file": f"mode_{number}.npz"}
+    (tmp_path / "tables").mkdir()
+    (tmp_path / "tables" / "reference.csv").write_text("t,level\n0,1\n100,2\n")
+    signal = {"kind": "table", "file": "tables/reference.csv", "column": "level"}
+    document["scenario"]["reference"] = [signal, 0.0]
+    (tmp_path / "tank.toml").write_text(tomli_w.dumps(document))
+    first = ftc.load(tmp_path / "tank.toml")
+    again = ftc.load(first.save(tmp_path / "copy" / "tank.toml"))
+    assert again.core.record() == first.core.record()
+    np.testing.assert_array_equal(again.simulate()["y_ref"], first.simulate()["y_ref"])
+
+
 def test_a_design_travels(tank: ftc.Design) -> None:
     """To another process and back, without solving again."""
     again = pickle.loads(pickle.dumps(tank))  # noqa: S301
@@ -105,6 +125,15 @@ def test_reports(tank: ftc.Design) -> None:
     page = tank._repr_html_()
     assert page.lower().count("<svg") >= 1
     assert "tank" in page
+
+
+@pytest.mark.parametrize("threads", [0, -1, "2", 1.5])
+def test_threads_are_a_whole_number(tanks: ftc.Plant, threads: object) -> None:
+    """Refused by name."""
+    with pytest.raises(ftc.DesignFileError, match=r"threads is .*: give a whole number from 1 on"):
+        ftc.design(tanks, threads=threads)
+    with pytest.raises(ftc.DesignFileError, match=r"threads is .*: give a whole number from 1 on"):
+        ftc.load(EXAMPLES / "tank.toml", threads=threads)
 
 
 def test_an_unknown_key_is_named(tanks: ftc.Plant) -> None:

@@ -56,6 +56,42 @@ def test_discrete_models_stay_as_they_are(system: object) -> None:
         np.testing.assert_array_equal(found, expected)
 
 
+def test_several_models_in_a_tuple() -> None:
+    """Are modes, as in a list; numbers of things are said as people say them."""
+    model = control.ss(A, B, C, D)
+    assert repr(ftc.Plant((model, model), 0.5)) == (
+        "<ftc_fmu.Plant: 2 modes, 2 states, 2 inputs, 1 output, 0 disturbances, 0.5 s>"
+    )
+
+
+def test_a_single_disturbance_needs_no_list() -> None:
+    """By its column or its name, which the first model gives to those that have none."""
+    named = control.ss(A, B, C, D, inputs=["pump", "rain"])
+    for disturbance in (1, np.int64(1), "rain", ["rain"]):
+        plant = ftc.Plant([named, control.ss(A, B, C, D)], 0.5, disturbance)
+        assert [mode.E.shape for mode in plant.modes] == [(2, 1), (2, 1)]
+        assert plant.signals["inputs"] == [{"name": "pump"}]
+
+
+def test_modes_of_other_signals_are_refused() -> None:
+    """Of another number, or in another order, of inputs, outputs or states."""
+    model = control.ss(A, B, C, D, inputs=["pump", "rain"])
+    turned = control.ss(A, B, C, D, inputs=["rain", "pump"])
+    with pytest.raises(ftc.DesignFileError, match=r"systems\[1\] has the inputs rain, pump, systems\[0\] pump, rain"):
+        ftc.Plant([model, turned], 0.5)
+    with pytest.raises(ftc.DesignFileError, match=r"systems\[1\] has 1 states, 1 inputs and 1 outputs, systems"):
+        ftc.Plant([model, control.ss(-1, 1, 1, 0)], 0.5)
+    with pytest.raises(ftc.DesignFileError, match="outputs is 'level': give a list with an entry per signal"):
+        ftc.Plant(model, 0.5, outputs="level")
+
+
+def test_a_transfer_function_is_told_how_to_become_a_state_space() -> None:
+    """Of either package."""
+    for transfer in (control.tf([1], [1, 1]), scipy.signal.TransferFunction([1], [1, 1])):
+        with pytest.raises(ftc.DesignFileError, match=r"control\.ss\(\.\.\.\) and \.to_ss\(\)"):
+            ftc.Plant([transfer], 0.5)
+
+
 def test_names_of_the_model_are_kept() -> None:
     """Labels that a person gave become names, and a disturbance may be named."""
     system = control.ss(A, B, C, D, inputs=["valve", "wind"], outputs=["speed"], states=["speed", "torque"])

@@ -64,6 +64,62 @@ def test_a_picture_shows_outputs_and_faults(run: ftc.Run, tmp_path: Path) -> Non
     values = drawn[labels.index("fault-tolerant")].get_ydata()
     np.testing.assert_array_equal(values, run["ftc.y_true"][:, 0])
     figure.savefig(tmp_path / "run.png")
+    assert figure._repr_png_().startswith(b"\x89PNG"), "a notebook shows it"
+
+
+def test_what_is_drawn_is_one_of_the_variants(run: ftc.Run) -> None:
+    """One needs no list; one that did not run is refused by name."""
+    labels = [line.get_label() for line in run.plot("told_the_fault").axes[0].lines]
+    assert labels == ["told the true fault", "reference"]
+    with pytest.raises(ValueError, match="variants names 'mpc': give some of ftc, no_ftc, told_the_fault"):
+        run.plot(["ftc", "mpc"])
+
+
+def test_one_line(run: ftc.Run, paper: ftc.Design) -> None:
+    """For a prompt."""
+    assert repr(run) == f"<ftc_fmu.Run: {len(run['t'])} samples, ftc, no_ftc, told_the_fault>"
+    assert repr(paper.controller()) == "<ftc_fmu.Controller: 2 sensors, 2 commands, ftc_enabled=True>"
+
+
+def test_a_fault_that_is_believed_is_told() -> None:
+    """A drift that could be the plant's is told with what takes it out; where that was done nothing is told."""
+    inertia, stiffness, damping = 0.002, 25.0, 0.02
+
+    def drive(load: float) -> tuple:
+        A = [
+            [-0.03 / inertia, damping / inertia, -stiffness / inertia],
+            [damping / load, -0.04 / load, stiffness / load],
+            [1.0, -1.0, 0.0],
+        ]
+        return A, [[1 / inertia, 0.0], [0.0, -1 / load], [0.0, 0.0]], np.eye(2, 3), 0, 0
+
+    plant = ftc.Plant(
+        [drive(0.004), drive(0.02)],
+        sample_time=0.002,
+        disturbance_inputs=[1],
+        inputs=[{"name": "torque", "unit": "1", "min": -60.0, "max": 60.0}, "load torque"],
+        outputs=[{"name": "motor speed", "nominal": 50.0}, {"name": "load speed", "nominal": 50.0}],
+    )
+    keys = {"tracked": ["load speed"], "decay": 0.99, "input_weight": 0.3, "scenario": {"noise": 0.05}}
+    drift = {"kind": "drift", "sensor": "load speed", "from": 3.0, "until": 4.5, "slope": 5.0}
+    scenario = {
+        "noise": 0.05,
+        "steps": 3000,
+        "reference": [{"kind": "steps", "points": [[0.2, 50.0]]}],
+        "schedule": [{"from": 0.0, "mode": 1}, {"from": 2.0, "mode": 2}],
+        "events": [drift],
+    }
+    believed = ftc.design(plant, **keys).simulate(scenario)
+    (told,) = [warning for warning in believed.warnings if "was believed" in warning]
+    assert "a fault of load speed of up to 7.49 was believed in 100.0 %" in told
+    assert "trust-model" in told
+    assert "on load torque" in str(believed), "the step on a disturbance that has a name"
+    assert "model_error" in told
+    estimator = {"ambiguous": "trust-model", "model_error": 0.002}
+    found = ftc.design(plant, **keys, estimator=estimator).simulate(scenario)
+    assert not any("was believed" in warning for warning in found.warnings)
+    errors = [run.metrics["ftc"]["mse"]["true"][0] for run in (believed, found)]
+    assert errors[1] < 0.95 * errors[0]
 
 
 def test_another_scenario(paper: ftc.Design) -> None:

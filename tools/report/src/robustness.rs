@@ -93,11 +93,12 @@ fn departures(design: &Design) -> Vec<(String, Deviation)> {
     }
     for channel in 0..dims.disturbances {
         let size = height(design, channel);
-        let name = format!(
-            "a step of {} on disturbance {}",
-            significant(size),
-            channel + 1
+        let described = design.signals.disturbances.get(channel);
+        let whose = described.map_or_else(
+            || format!("disturbance {}", channel + 1),
+            |signal| signal.name.clone(),
         );
+        let name = format!("a step of {} on {whose}", significant(size));
         step(name, Port::Disturbance(channel), size);
     }
     let mut late = own;

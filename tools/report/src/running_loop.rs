@@ -1,6 +1,6 @@
 //! What is proved of the loop that runs, in words and as JSON.
 
-use crate::text::count;
+use crate::text::{count, with_units};
 use ftc_design::running_loop::{TRANSFER_DECAY, TransferCertificate};
 use ftc_design::{Design, LostSensors, Lyapunov, Proof, Signal};
 use serde_json::{Value, json};
@@ -30,7 +30,7 @@ pub fn gains(design: &Design, proof: &Proof) -> Lines {
                     true => "noise on the command not known without scenario.noise".into(),
                     false => format!(
                         "noise on the command {}",
-                        with_units(&running.command_noise[mode], inputs)
+                        with_units(&running.command_noise[mode], inputs, 2)
                     ),
                 }
             ),
@@ -253,13 +253,4 @@ fn short(gain: f64) -> String {
         true => format!("{gain:.1e}"),
         false => format!("{gain:.4}"),
     }
-}
-
-fn with_units(values: &[f64], signals: &[Signal]) -> String {
-    let one = |(value, signal): (&f64, &Signal)| match &signal.unit {
-        Some(unit) => format!("{value:.2e} {unit}"),
-        None => format!("{value:.2e}"),
-    };
-    let texts: Vec<String> = values.iter().zip(signals).map(one).collect();
-    texts.join(", ")
 }

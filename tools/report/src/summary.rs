@@ -1,14 +1,14 @@
 //! The design report, for a person and for a program.
 
 use crate::running_loop;
-use crate::text::{count, number};
+use crate::text::{count, number, with_units};
 use crate::warnings;
 use ftc_control::parameters::{Compensation, EstimatorMethod, Hypotheses, ObserverKind};
 use ftc_design::apart;
 use ftc_design::augmented::assumes_input_disturbance;
 use ftc_design::running_loop::TransferCertificate;
 use ftc_design::{
-    ControlProof, ControlSpec, Design, DesignError, Failure, ObserverProof, Signal, StateFeedback,
+    ControlProof, ControlSpec, Design, DesignError, Failure, ObserverProof, StateFeedback,
 };
 use serde_json::{Value, json};
 use std::fmt::Write;
@@ -243,7 +243,7 @@ fn estimator(design: &Design) -> Vec<(String, String)> {
         lines.extend(found_mode(design, settings));
         lines.push(line(
             "largest correction",
-            with_units(&settings.authority, outputs),
+            with_units(&settings.authority, outputs, 3),
         ));
     } else {
         lines.push(line(
@@ -261,13 +261,13 @@ fn estimator(design: &Design) -> Vec<(String, String)> {
             format!(
                 "{} samples, residual deviation {}",
                 predictor.samples,
-                with_units(&predictor.deviation, outputs)
+                with_units(&predictor.deviation, outputs, 3)
             ),
         ));
     }
     lines.push(line(
         "thresholds",
-        with_units(&estimator.thresholds, outputs),
+        with_units(&estimator.thresholds, outputs, 3),
     ));
     if estimator.hypotheses.is_none() {
         lines.push(line(
@@ -335,15 +335,6 @@ fn certificate(control: &ControlProof) -> Vec<(String, String)> {
             "every inequality of the shipped gains is proved positive definite, rounding included",
         ),
     ]
-}
-
-fn with_units(values: &[f64], signals: &[Signal]) -> String {
-    let one = |(value, signal): (&f64, &Signal)| match &signal.unit {
-        Some(unit) => format!("{value:.3e} {unit}"),
-        None => format!("{value:.3e}"),
-    };
-    let texts: Vec<String> = values.iter().zip(signals).map(one).collect();
-    texts.join(", ")
 }
 
 /// The report a program reads.

@@ -1,5 +1,7 @@
 //! Numbers and lists in words.
 
+use ftc_design::Signal;
+
 /// A string that is legal in XML: control characters become the replacement character.
 pub fn clean(text: &str) -> String {
     text.chars()
@@ -10,9 +12,20 @@ pub fn clean(text: &str) -> String {
         .collect()
 }
 
-/// `name (unit)`, or the name alone where there is no unit.
+/// `name (unit)`, or the name alone where there is no unit, or a number's.
 pub fn with_unit(name: &str, unit: Option<&str>) -> String {
+    let unit = unit.filter(|unit| *unit != "1");
     unit.map_or_else(|| name.to_owned(), |unit| format!("{name} ({unit})"))
+}
+
+/// Values of signals with so many digits behind the point, each with its unit.
+pub fn with_units(values: &[f64], signals: &[Signal], digits: usize) -> String {
+    let one = |(value, signal): (&f64, &Signal)| match signal.unit.as_deref() {
+        Some(unit) if unit != "1" => format!("{value:.digits$e} {unit}"),
+        _ => format!("{value:.digits$e}"),
+    };
+    let texts: Vec<String> = values.iter().zip(signals).map(one).collect();
+    texts.join(", ")
 }
 
 /// At most four significant digits, a real minus sign, and a dash for what is no number.

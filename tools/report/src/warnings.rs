@@ -258,6 +258,20 @@ fn calmer(design: &Design) -> &'static str {
     }
 }
 
+/// What lets a fault be noticed that was believed.
+fn missed(design: &Design) -> &'static str {
+    match &design.controller.estimator.hypotheses {
+        Some(settings) if settings.trusts_model() => {
+            "the model explains it within estimator.model_error: give a smaller one if the plant is known better"
+        }
+        Some(_) => {
+            "what grows slowly could be the plant's doing, and the sensor is trusted: where it is the sensor's, set \
+             estimator.ambiguous = \"trust-model\", and a smaller estimator.model_error if the plant is known better"
+        }
+        None => "lower estimator.sigmas or threshold, or give modes more time",
+    }
+}
+
 fn of_run(design: &Design, calmer: &str, warning: &RunWarning) -> String {
     let inputs = &design.signals.inputs;
     let percent = |share: f64| format!("{:.1} % of the samples", 100.0 * share);
@@ -296,6 +310,18 @@ fn of_run(design: &Design, calmer: &str, warning: &RunWarning) -> String {
                 Some(_) => "raise estimator.authority",
                 None => "widen the output's min and max",
             }
+        ),
+        RunWarning::Unnoticed {
+            sensor,
+            share,
+            largest,
+        } => format!(
+            "ftc: a fault of {} of up to {} was believed in {:.1} % of the samples that had one above three \
+             thresholds: {}",
+            design.signals.outputs[sensor].name,
+            number(largest),
+            100.0 * share,
+            missed(design)
         ),
         RunWarning::NoisyCommand { input, deviation } => format!(
             "ftc: the noise of the sensors moves {} by {} (standard deviation), more than a tenth of its range: \
