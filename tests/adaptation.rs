@@ -69,7 +69,7 @@ fn a_plant_that_changed_is_predicted_better() {
 }
 
 /// Inputs hundreds of times those of the database, a predictor that noise made imprecise, and a
-/// sensor accused: following the residual closed the loop over that predictor, and it diverged.
+/// sensor flagged: following the residual closed the loop over that predictor, and it diverged.
 #[test]
 fn an_imprecise_predictor_closes_no_loop() {
     let mut dice = Dice::seeded(32);

@@ -120,7 +120,7 @@ proptest! {
         direction in prop::array::uniform2(-1.0..1.0f64),
         steering in prop::array::uniform2(-1.0..1.0f64),
         reference in prop::array::uniform2(-1.0..1.0f64),
-        believe in prop::array::uniform2(any::<bool>()),
+        as_read in prop::array::uniform2(any::<bool>()),
     ) {
         let controller = Controller::new(parameters(design)).unwrap();
         let mut state = controller.initial_state(0);
@@ -137,8 +137,8 @@ proptest! {
             let y = [x[0] + fault, x[1] + 0.01 * (tick as f64).sin()];
             let mode = usize::from(tick >= switch);
             // Compensation may be switched off or on just before the last tick.
-            let believes = believe[usize::from(tick == ticks)];
-            let compensate = if believes { Compensate::Nothing } else { Compensate::Estimate };
+            let uses_readings = as_read[usize::from(tick == ticks)];
+            let compensate = if uses_readings { Compensate::Nothing } else { Compensate::Estimate };
             let sample = |y: &[f64; 2], reference: &[f64; 2], state: &mut ControllerState, derive: Option<ftc_control::Change<'_>>| {
                 let sample = controller.sample(tick, mode, y, reference).unwrap().compensating(compensate).unwrap();
                 match derive {

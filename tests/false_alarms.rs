@@ -1,4 +1,4 @@
-//! Healthy sensors are not accused: random plants under noise, disturbance and mode switches, with
+//! Healthy sensors are not flagged: random plants under noise, disturbance and mode switches, with
 //! thresholds at 6 standard deviations of the residual.
 //!
 //! promise: no-false-alarms
@@ -16,7 +16,7 @@ const PLANTS: usize = 4;
 const EVERY: u64 = 5_000;
 
 #[test]
-fn no_healthy_sensor_is_accused() {
+fn no_healthy_sensor_is_flagged() {
     let mut dice = Dice::seeded(71);
     let mut samples = 0;
     for plant in 0..PLANTS {

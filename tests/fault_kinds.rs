@@ -86,7 +86,7 @@ fn disturbed() -> [f64; 2] {
     largest
 }
 
-/// The loop that believes its sensors, without noise.
+/// The loop without fault compensation, without noise.
 fn quietly(events: &[FaultEvent]) -> Trajectory {
     run_with_noise(events, Variant::NoFtc, 0.0)
 }
@@ -142,9 +142,9 @@ fn every_kind_at_every_time_on_either_sensor_or_both() {
                 let healthy = simulate(&[], Variant::Ftc);
                 let tolerant = simulate(&events, Variant::Ftc);
                 let off = distance(&tolerant, &healthy, judged);
-                let believing = distance(&simulate(&events, Variant::NoFtc), &healthy, judged);
+                let uncompensated = distance(&simulate(&events, Variant::NoFtc), &healthy, judged);
                 println!(
-                    "{name} {when} on {sensors:?}: off by {off:.3}, without FTC by {believing:.3}"
+                    "{name} {when} on {sensors:?}: off by {off:.3}, without FTC by {uncompensated:.3}"
                 );
                 assert!(
                     off < unseen,

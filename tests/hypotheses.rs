@@ -1,5 +1,5 @@
 //! The state-based estimator in the loop: the paper's faults are taken out at once, no good sensor is
-//! sacrificed when the plant is not the model, healthy sensors are not accused, and whatever the sensors
+//! sacrificed when the plant is not the model, healthy sensors are not flagged, and whatever the sensors
 //! say the numbers stay finite. What is not promised stands in the README (Known limits).
 
 mod common;
@@ -105,7 +105,7 @@ fn median(mut values: Vec<f64>) -> f64 {
 }
 
 #[test]
-fn healthy_sensors_are_believed_when_an_input_loses_gain() {
+fn healthy_sensors_are_not_flagged_when_an_input_loses_gain() {
     let mut ratios = Vec::new();
     for design in designs(11, 5) {
         for factor in [0.9, 0.8, 0.7, 1.15] {
@@ -121,28 +121,28 @@ fn healthy_sensors_are_believed_when_an_input_loses_gain() {
     assert!(worst <= 2.0 && median(ratios) <= 1.01, "{worst}");
 }
 
-/// Samples of the design's own scenario in which a sensor is accused.
-fn accusations(design: &Design) -> usize {
+/// Samples of the design's own scenario in which a sensor is flagged.
+fn flagged_samples(design: &Design) -> usize {
     let run = simulate(design, &design.plant, Variant::Ftc);
-    let accused = run.records.iter().filter(|r| r.flagged.contains(&true));
-    accused.count()
+    let flagged = run.records.iter().filter(|r| r.flagged.contains(&true));
+    flagged.count()
 }
 
 #[test]
-fn healthy_sensors_are_not_accused() {
+fn healthy_sensors_are_not_flagged() {
     for mut design in designs(13, 3) {
         design.scenario.steps = 20_000;
-        assert_eq!(accusations(&design), 0);
+        assert_eq!(flagged_samples(&design), 0);
     }
 }
 
 /// Three times the noise that the design was told; thirty times is a known limit.
 #[test]
-fn sensors_noisier_than_told_are_not_accused() {
+fn sensors_noisier_than_told_are_not_flagged() {
     for mut design in designs(19, 4) {
         let parts = design.scenario.noise.iter_mut();
         parts.for_each(|deviation| *deviation *= 3.0);
-        assert_eq!(accusations(&design), 0);
+        assert_eq!(flagged_samples(&design), 0);
     }
 }
 

@@ -99,7 +99,7 @@ fn a_known_disturbance_hides_no_larger_bias() {
     );
 }
 
-/// Accused before the switch, stuck across it: the held estimate is wrong by then.
+/// Flagged before the switch, stuck across it: the held estimate is wrong by then.
 #[test]
 fn a_stuck_sensor_is_carried_across_a_switch() {
     for parameters in designs() {
@@ -107,7 +107,7 @@ fn a_stuck_sensor_is_carried_across_a_switch() {
         let stuck = simulate(&parameters, FaultKind::Stuck, 690.0, 900.0, Variant::Ftc);
         assert!(
             stuck.records[790].flagged[0],
-            "not accused before the switch"
+            "not flagged before the switch"
         );
         let (ours, least) = (error(&stuck, 750), error(&silent, 750));
         assert!(ours < 1.5 * least + 0.1, "{ours} against {least}");

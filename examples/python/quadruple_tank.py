@@ -72,7 +72,7 @@ def design() -> ftc.Design:
         integral_weight=0.01,
         input_weight=0.3,
         disturbance={"period": 1200.0, "amplitude": 3.0},
-        # The model is exact here, so what it does not explain is a fault, a drift, too. The default believes a sensor
+        # The model is exact here, so what it does not explain is a fault, a drift, too. The default trusts a sensor
         # that drifts, since a leak would look the same.
         estimator={"method": "reference"},
         scenario={

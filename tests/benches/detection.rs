@@ -1,4 +1,4 @@
-//! How quickly faults are found, how often healthy sensors are accused, and whether the right one is:
+//! How quickly faults are found, how often healthy sensors are flagged, and whether the right one is:
 //! 200 random faults on 20 random plants, seeded, printed as tables.
 #![allow(missing_docs)]
 
@@ -28,9 +28,9 @@ fn schedule(te: f64, steps: u64, every: u64) -> Vec<ModeInterval> {
 struct Tally {
     healthy_samples: u64,
     false_alarms: u64,
-    /// Per kind: name, faults, found, sum and worst of delays, others accused.
+    /// Per kind: name, faults, found, sum and worst of delays, others flagged.
     kinds: Vec<(String, u64, u64, u64, u64, u64)>,
-    /// `isolation[faulty][accused]`: samples.
+    /// `isolation[faulty][flagged]`: samples.
     isolation: [[u64; 3]; 3],
     faulty_samples: [u64; 3],
 }
@@ -104,7 +104,7 @@ fn faulty(design: &Design, dice: &mut Dice, index: usize, tally: &mut Tally) {
     );
     let window = &trajectory.records[from as usize..until as usize];
     let delay = window.iter().position(|r| r.flagged[sensor]);
-    let accused = window
+    let flagged_others = window
         .iter()
         .filter(|r| r.flagged.iter().enumerate().any(|(s, &f)| f && s != sensor))
         .count() as u64;
@@ -122,7 +122,7 @@ fn faulty(design: &Design, dice: &mut Dice, index: usize, tally: &mut Tally) {
         }
     };
     entry.1 += 1;
-    entry.5 += accused;
+    entry.5 += flagged_others;
     if let Some(delay) = delay {
         entry.2 += 1;
         entry.3 += delay as u64;
@@ -152,9 +152,9 @@ fn main() {
         "| fault | drawn | found | mean delay (samples) | worst delay | samples in which another sensor was flagged |"
     );
     println!("|---|---|---|---|---|---|");
-    for (name, drawn, found, sum, worst, accused) in &tally.kinds {
+    for (name, drawn, found, sum, worst, flagged_others) in &tally.kinds {
         println!(
-            "| {name} | {drawn} | {found} | {:.1} | {worst} | {accused} |",
+            "| {name} | {drawn} | {found} | {:.1} | {worst} | {flagged_others} |",
             *sum as f64 / (*found).max(1) as f64
         );
     }

@@ -65,7 +65,7 @@ def test_what_is_refused_is_heard_with_logging_off(
     assert "mode is 1, but mode_real is 2" in heard
 
 
-def test_readings_held_within_a_coarse_step_accuse_nobody(example_case: Callable[[str], Case]) -> None:
+def test_readings_held_within_a_coarse_step_flag_no_sensor(example_case: Callable[[str], Case]) -> None:
     """The converter's controller, stepped as `fmpy simulate` does: hundreds of samples a step, inputs never set."""
     case = example_case("converter")
     te = record.sample_time(case.record)
@@ -103,7 +103,7 @@ def test_a_model_that_is_a_little_wrong_is_no_wrong_coupling(tmp_path: Path, cap
             assert told == (parallel != right), (example, parallel)
 
 
-def test_fmpy_simulate_accuses_no_sensor(example_case: Callable[[str], Case], capfd: pytest.CaptureFixture) -> None:
+def test_fmpy_simulate_flags_no_sensor(example_case: Callable[[str], Case], capfd: pytest.CaptureFixture) -> None:
     """`fmpy simulate` on the converter's controller: no inputs, steps of four samples, no mode told."""
     result = fmpy.simulate_fmu(str(example_case("converter").fmus.controller))
     flags = [name for name in result.dtype.names if name.startswith("fault")]

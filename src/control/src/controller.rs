@@ -100,7 +100,7 @@ fn has_length(signal: &'static str, values: &[f64], needed: usize) -> Result<(),
     reason = "nothing, what is estimated, or what is known"
 )]
 pub enum Compensate<'a> {
-    /// None: the controller believes its sensors.
+    /// None: the controller uses the readings as they are.
     Nothing,
     /// The estimate `f_hat`.
     Estimate,

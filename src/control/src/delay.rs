@@ -21,7 +21,7 @@ const LEAST: u32 = 20;
 /// Samples after which it is left undecided.
 const MOST: u32 = 500;
 
-/// The logarithm of the likelihood ratio at which a delay is believed: a chance of `e^-30`.
+/// The logarithm of the likelihood ratio at which a delay is reported: a chance of `e^-30`.
 const CERTAIN: f64 = 30.0;
 
 /// How many times smaller the squares of some output must be: a model that is a little wrong fits a

@@ -1,7 +1,7 @@
 //! The model run in open loop while residuals cannot be used, and the sensors it contradicts.
 //!
 //! While the regressor mixes modes, or lies beyond what the database spans, no residual can be
-//! used, and an accused sensor is corrected by the last estimate of its fault. That is right for
+//! used, and a flagged sensor is corrected by the last estimate of its fault. That is right for
 //! a bias. A sensor that is stuck, or whose fault comes or goes just then, would leave the loop
 //! without feedback: where the corrected reading and the model's run since then drift far apart, the
 //! model's output replaces the reading.

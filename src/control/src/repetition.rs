@@ -96,7 +96,7 @@ mod tests {
     }
 
     #[test]
-    fn held_readings_accuse_nobody() {
+    fn held_readings_flag_no_sensor() {
         let mut repetition = Repetition::new(1);
         for k in 0..100 {
             if k % 10 > 0 {

@@ -38,7 +38,7 @@ pub struct Tuning {
     /// window: far above rounding, far below noise.
     pub window_rank: f64,
     /// Share of the threshold (1) below which a constant residual, or the rest a fit leaves, is no fault: half
-    /// of what would be accused.
+    /// of what would be flagged.
     pub recovery_share: f64,
     /// Initial variance of that fit over that of the noise (1): nothing is known.
     pub recovery_variance: f64,

@@ -117,7 +117,7 @@ pub(crate) fn fit(
         return Err(Unusable::Late);
     }
     let (mut theta, mut left) = grey.improve(&learn, &model, model_error);
-    // What was held back decides: a log that the model explains better teaches nothing.
+    // What was held back decides: a log that the model explains better is not used.
     grey.deviation = grey.unexplained(&judges, &model);
     let (of_model, of_fit) = (grey.rests(&judges, &model), grey.rests(&judges, &theta));
     if of_fit >= of_model {

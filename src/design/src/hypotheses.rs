@@ -51,7 +51,7 @@ const CHANGE_RATE: f64 = 1e-3;
 const LOAD_RATE: f64 = 1e-5;
 /// Relative error of the matrices of a plant that is no longer the model.
 const CHANGED_ERROR: f64 = 1.0;
-/// Log odds of an accusation against the best explanation without one: 20 to 1.
+/// Log odds of a sensor's fault against the best explanation without one: 20 to 1.
 const ODDS: f64 = 3.0;
 /// Wander of an abrupt fault per sample, in noise deviations.
 const FAULT_WALK: f64 = 0.05;

@@ -226,7 +226,7 @@ fn an_order_that_is_asked_for_is_kept() {
     assert_eq!(found.coordinates, Coordinates::Single);
 }
 
-/// A disturbance that nobody measured, of known period: the plant is found, its oscillation is not.
+/// A disturbance that was not measured, of known period: the plant is found, its oscillation is not.
 #[test]
 fn a_periodic_disturbance_is_told_from_the_plant() {
     const PERIOD: f64 = 120.0;

@@ -290,7 +290,7 @@ mod tests {
         assert_eq!(values, [0.0, 0.0, 0.0, 1.0, 1.0, -1.0, -1.0]);
     }
 
-    /// A forged length of a scenario keeps nobody waiting.
+    /// The range is found in a bounded time, whatever the length of a scenario.
     #[test]
     fn the_range_of_a_scenario_without_end_is_found() {
         let signal = Waveform::Sine {

@@ -15,7 +15,7 @@ use serde::Serialize;
 pub enum Variant {
     /// The design as it is: faults estimated and compensated.
     Ftc,
-    /// The same gains, believing every sensor, told the mode.
+    /// The same gains without fault compensation, told the mode.
     NoFtc,
     /// The same gains, told the true fault and the mode: what a perfect estimate of it would give. One that also
     /// takes up disturbance or noise may do better.

@@ -9,7 +9,7 @@ use ftc_simulate::closed_loop::{self, Seen};
 use ftc_simulate::{PlantSimulator, Variant};
 use serde::{Deserialize, Serialize};
 
-/// Samples after the end of a fault in which its sensor may still be accused without a false alarm.
+/// Samples after the end of a fault in which its sensor may still be flagged without a false alarm.
 const DETECTION_WINDOW: u64 = 50;
 /// Errors beyond this one are all alike: the loop has diverged.
 const DIVERGED: f64 = 1e12;
@@ -25,11 +25,11 @@ pub struct Outcome {
     pub error: [f64; 3],
     /// The faults, in the order in which they were drawn.
     pub faults: Vec<FaultDetection>,
-    /// Per sensor (p): how often it was accused while it was sound.
+    /// Per sensor (p): how often it was flagged while it was sound.
     pub false_alarms: Vec<u64>,
     /// Per sensor (p): samples in which it was sound.
     pub sound_samples: Vec<u64>,
-    /// Where there was one fault: its sensor, and the first sensor accused while it lasted.
+    /// Where there was one fault: its sensor, and the first sensor flagged while it lasted.
     pub isolation: Option<(usize, Option<usize>)>,
     /// Switches between modes.
     pub switches: u64,
@@ -56,9 +56,9 @@ pub struct FaultDetection {
     pub until: u64,
     /// Size in output units; the loss of a gain; zero for kinds without a size.
     pub size: f64,
-    /// Samples until its sensor was accused, if it was.
+    /// Samples until its sensor was flagged, if it was.
     pub delay: Option<u64>,
-    /// Whether another fault of the same sensor, or an accusation that stood before it, leaves it open
+    /// Whether another fault of the same sensor, or a flag raised before it, leaves it open
     /// whether this one was seen.
     pub hidden: bool,
 }
@@ -138,13 +138,13 @@ fn square_error(design: &Design, seen: &Seen<'_>) -> f64 {
         .sum()
 }
 
-/// Who was accused when.
+/// Which sensor was flagged when.
 struct Detection {
     faults: Vec<FaultDetection>,
     flagged: Vec<bool>,
     false_alarms: Vec<u64>,
     sound_samples: Vec<u64>,
-    accused_first: Option<usize>,
+    flagged_first: Option<usize>,
 }
 
 impl Detection {
@@ -167,7 +167,7 @@ impl Detection {
             flagged: vec![false; sensors],
             false_alarms: vec![0; sensors],
             sound_samples: vec![0; sensors],
-            accused_first: None,
+            flagged_first: None,
         }
     }
 
@@ -197,7 +197,7 @@ impl Detection {
                 && raised
                 && fault.is_present(tick)
             {
-                self.accused_first.get_or_insert(sensor);
+                self.flagged_first.get_or_insert(sensor);
             }
             self.flagged[sensor] = flagged;
         }
@@ -205,7 +205,7 @@ impl Detection {
 
     fn outcome(self, run: u64, error: [f64; 3], drawn: &Drawn) -> Outcome {
         let isolation = match &self.faults[..] {
-            [fault] if !fault.hidden => Some((fault.sensor, self.accused_first)),
+            [fault] if !fault.hidden => Some((fault.sensor, self.flagged_first)),
             _ => None,
         };
         Outcome {

@@ -32,13 +32,13 @@ pub struct Statistics {
     pub faulty_runs: u64,
     /// By kind of fault.
     pub kinds: BTreeMap<String, KindStatistics>,
-    /// Of runs with one fault: `[faulty sensor][sensor accused first, or p where none was]`.
+    /// Of runs with one fault: `[faulty sensor][sensor flagged first, or p where none was]`.
     pub isolation: Vec<Vec<u64>>,
-    /// Accusations of sound sensors, per sensor (p).
+    /// How often sound sensors were flagged, per sensor (p).
     pub false_alarms: Vec<u64>,
     /// Samples in which a sensor was sound, per sensor (p).
     pub sound_samples: Vec<u64>,
-    /// Runs in which a sound sensor was accused.
+    /// Runs in which a sound sensor was flagged.
     pub runs_with_false_alarm: u64,
     /// Of the runs without a fault.
     pub healthy: Healthy,
@@ -56,7 +56,7 @@ pub struct Statistics {
 pub struct KindStatistics {
     /// Faults that could be told from any other.
     pub count: u64,
-    /// Of these, those whose sensor was accused while they lasted.
+    /// Of these, those whose sensor was flagged while they lasted.
     pub detected: u64,
     /// Samples until then, and one.
     pub delay: Histogram,
@@ -74,17 +74,17 @@ pub struct Healthy {
     pub over_none: Histogram,
     /// Runs in which fault tolerance did worse than none, by more than one percent.
     pub worse_than_none: u64,
-    /// Runs in which a sensor was accused.
+    /// Runs in which a sensor was flagged.
     pub accused: u64,
 }
 
 impl Healthy {
-    fn add(&mut self, error: f64, over_none: f64, accused: bool) {
+    fn add(&mut self, error: f64, over_none: f64, flagged: bool) {
         self.runs += 1;
         self.error.add(error);
         self.over_none.add(over_none);
         self.worse_than_none += u64::from(over_none > 1.0 + WORSE);
-        self.accused += u64::from(accused);
+        self.accused += u64::from(flagged);
     }
 
     fn merge(&mut self, other: &Self) {
@@ -152,9 +152,9 @@ impl Statistics {
         self.error_told.add(told);
         self.over_told.add(over_told);
         self.over_none.add(over_none);
-        let accused = outcome.false_alarms.iter().any(|&n| n > 0);
+        let flagged = outcome.false_alarms.iter().any(|&n| n > 0);
         if outcome.faults.is_empty() {
-            self.healthy.add(with, over_none, accused);
+            self.healthy.add(with, over_none, flagged);
         } else {
             self.faulty_runs += 1;
             self.worse_than_none += u64::from(over_none > 1.0 + WORSE);
@@ -172,14 +172,14 @@ impl Statistics {
                 kind.delay.add(delay as f64 + 1.0);
             }
         }
-        if let Some((sensor, accused)) = outcome.isolation {
+        if let Some((sensor, flagged)) = outcome.isolation {
             let row = &mut self.isolation[sensor];
             let none = row.len() - 1;
-            row[accused.unwrap_or(none)] += 1;
+            row[flagged.unwrap_or(none)] += 1;
         }
         add_all(&mut self.false_alarms, &outcome.false_alarms);
         add_all(&mut self.sound_samples, &outcome.sound_samples);
-        self.runs_with_false_alarm += u64::from(accused);
+        self.runs_with_false_alarm += u64::from(flagged);
         self.rank([Worst {
             run: outcome.run,
             over_told,

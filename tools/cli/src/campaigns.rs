@@ -27,7 +27,7 @@ const LARGEST_RESULT: u64 = 256 << 20;
 const PAGE: &str = "campaign.html";
 /// Name of the file with a row per run.
 const ROWS: &str = "runs.parquet";
-/// Runs of a campaign, where nobody says.
+/// Runs of a campaign, where no number is given.
 const RUNS: u64 = 1000;
 /// How often a sign of life is printed where there is no terminal.
 const LINE_EVERY: Duration = Duration::from_secs(10);

@@ -28,7 +28,7 @@ pub struct Asked {
     /// Seconds between two rows, where no column tells the time.
     #[arg(long, value_name = "SECONDS")]
     sample_time: Option<f64>,
-    /// Period of a disturbance that is in the logs and that nobody measured: it is told from the plant.
+    /// Period of a disturbance that is in the logs and that was not measured: it is told from the plant.
     #[arg(long, value_name = "SECONDS")]
     period: Option<f64>,
     /// Harmonics of that disturbance, the fundamental included.

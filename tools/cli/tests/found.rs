@@ -37,7 +37,7 @@ fn run(design: &str) -> (f64, f64, Vec<bool>) {
     (mse("ftc"), mse("told_the_fault"), flags)
 }
 
-/// Accused long before the switch, it was corrected by a held estimate: true MSE 28 for 0.05.
+/// Flagged long before the switch, it was corrected by a held estimate: true MSE 28 for 0.05.
 #[test]
 fn a_stuck_sensor_across_a_switch() {
     let (tolerant, told, _) = run(include_str!("found/stuck_across_switch.toml"));

@@ -166,7 +166,7 @@ fn the_converter_under_every_fault() {
         for (letter, output) in sensors {
             let fault = format!("{letter}_{kind}");
             let rivals = ["ftc", "mpc"].map(|controller| find(&fault, controller, output));
-            // A current sensor that is silent cannot lie, and the current's model is exact: both
+            // A current sensor that gives no reading has no wrong one, and the current's model is exact: both
             // reach the deadbeat bound, and differ by less than the noise, 0.05 A, is worth beside
             // a reference of 8 A.
             let silent = fault == "i_dropout";

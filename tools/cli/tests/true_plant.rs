@@ -196,7 +196,7 @@ fn simulate_tries_other_plants() {
         assert!(text.contains(word), "{word}: {text}");
     }
     let of = |case: &serde_json::Value, who: &str| case["mse"][who][0].as_f64().unwrap();
-    // A fault of half the reference: fault tolerance pays on the first output in the scenario itself.
+    // A fault of half the reference: fault tolerance helps on the first output in the scenario itself.
     assert!(of(&found[0], "ftc") < 0.2 * of(&found[0], "no_ftc"));
     // Every case in which fault tolerance does worse than none is said, and no other.
     let healthy = DESIGN.replace(

@@ -1,4 +1,4 @@
-//! Designs that say nothing of the estimator: no good sensor is sacrificed, and nothing is blind. In each of
+//! Designs that say nothing of the estimator: no healthy sensor is given up, and faults are found. In each of
 //! these situations an earlier default did many times worse than a loop that is told the fault.
 
 mod common;

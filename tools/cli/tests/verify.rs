@@ -471,7 +471,7 @@ fn a_damaged_archive_is_never_taken_for_another_design() {
     assert!(10 * noticed > 8 * places.len(), "{noticed}");
 }
 
-/// Archives that nobody should have to unpack, and descriptions that took minutes to read.
+/// Archives too large to unpack, and descriptions that took minutes to read.
 ///
 /// promise: bounded-reading
 #[test]

@@ -224,7 +224,7 @@ fn a_sensor_that_never_changes_is_refused() {
     }
 }
 
-/// A voltage sensor that sticks makes a controller that believes it empty the DC link. It once went
+/// A voltage sensor that sticks makes a controller that uses it empty the DC link. It once went
 /// through zero and to hundreds of kilovolts; its diodes hold it up.
 #[test]
 fn a_link_that_is_emptied_rests_on_its_diodes() {

@@ -353,7 +353,7 @@ fn beside(slave: &Slave, design: &Design) -> Result<(), String> {
     for tick in 0..TICKS {
         let mode = (tick / MODE_LASTS % modes) as usize;
         let point = &design.plant.modes[mode].operating_point.y;
-        // Small at first, so that everything is believed; then as far as faults go.
+        // Small at first, so that nothing is flagged; then as far as faults go.
         let share = if tick < TICKS / 2 { 0.01 } else { 1.0 };
         let mut around =
             |k: usize| point[k] + share * design.signals.outputs[k].nominal * random.next();

@@ -32,7 +32,7 @@ impl Replacement {
         builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o666));
         let begin = || {
             let _turn = unfinished::turn(folder);
-            // What cannot be swept is in nobody's way.
+            // What cannot be removed does no harm.
             recover(folder).ok();
             let temporary = builder.tempfile_in(folder)?;
             temporary.as_file().lock()?;

@@ -21,7 +21,7 @@ pub const MANIFEST: &str = "resources/contents.sha256";
 /// The signature of that list.
 pub const SIGNATURE: &str = "resources/contents.sha256.minisig";
 
-/// Holds the password of a secret key where nobody can be asked.
+/// Holds the password of a secret key where there is no terminal to ask on.
 pub const PASSWORD: &str = "FTC_FMU_KEY_PASSWORD";
 
 /// What `minisign -G` writes to its secret key file.

@@ -50,7 +50,7 @@ enum ControllerKind {
     AdditiveReference,
     /// Section III with the sliding window, as printed.
     AdditiveSliding,
-    /// The proposed gains, believing every sensor.
+    /// The proposed gains without fault compensation.
     NoFtc,
 }
 
@@ -92,7 +92,7 @@ impl ControllerKind {
                  but the reference window as estimator"
             }
             Self::AdditiveSliding => "the same with the sliding window (44) as printed",
-            Self::NoFtc => "the proposed gains, believing every sensor",
+            Self::NoFtc => "the proposed gains without fault compensation",
         }
     }
 

@@ -214,7 +214,7 @@ fn the_plant_publishes_nothing_that_is_not_finite() {
 
 /// Readings that are held within a step are not repeated by the sensor.
 #[test]
-fn held_readings_accuse_no_sensor() {
+fn held_readings_flag_no_sensor() {
     let mut design = fmu_host::model::example();
     design.controller.estimator.stuck_after = 3;
     let model = fmu_host::Model::controller(&design);

@@ -64,8 +64,8 @@ impl Controller {
         dy: &[f64],
     ) {
         let subtracted = self.takes_out_the_estimate(sample);
-        let believed = readings(&trial.repetition, sample);
-        let changes = trial.estimator.fault.iter().zip(believed).zip(dy);
+        let used = readings(&trial.repetition, sample);
+        let changes = trial.estimator.fault.iter().zip(used).zip(dy);
         let readings = trial
             .corrected
             .iter_mut()

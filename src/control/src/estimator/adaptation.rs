@@ -97,8 +97,8 @@ impl Adaptation {
     /// Learns from a healthy sample, the one last [predicted](Self::predict). `error` (p) is that of the
     /// database's prediction.
     pub fn learn(&mut self, regressor: &[f64], error: &[f64]) {
-        let believable = |(error, bound): (&f64, &f64)| error.abs() <= *bound;
-        if !error.iter().zip(&self.bound).all(believable) {
+        let plausible = |(error, bound): (&f64, &f64)| error.abs() <= *bound;
+        if !error.iter().zip(&self.bound).all(plausible) {
             return;
         }
         let scores = self.fixed_error.iter_mut().zip(&mut self.adapted_error);
@@ -214,7 +214,7 @@ mod tests {
     }
 
     #[test]
-    fn a_response_that_strays_is_not_believed() {
+    fn a_response_that_strays_is_not_used() {
         let (fixed, adapted) = adapt(&[-3.0, 0.5], &predictor(&[1.0, 0.5], 10.0), 4000);
         assert!(adapted.abs() <= fixed.abs() + 1e-12);
     }

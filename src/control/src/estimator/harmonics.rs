@@ -153,7 +153,7 @@ mod tests {
     use super::*;
 
     /// Rounding once made the covariance asymmetric, and forgetting let that grow until, after some
-    /// ten thousand samples, healthy sensors were accused.
+    /// ten thousand samples, healthy sensors were flagged.
     #[test]
     fn learning_for_ever_stays_sound() {
         let harmonics = Harmonics {

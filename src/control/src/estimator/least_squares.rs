@@ -39,7 +39,7 @@ impl LeastSquares {
         fit
     }
 
-    /// Forgets everything.
+    /// Back to the start.
     pub fn restart(&mut self, variance: f64) {
         self.coefficients.fill(0.0);
         self.covariance.fill(0.0);

@@ -38,7 +38,7 @@ use serde::{Deserialize, Serialize};
 struct Trust {
     /// By how much its threshold is widened: the prediction's deviation over that of the noise.
     widening: f64,
-    /// Whether a residual within the widened threshold clears an accused sensor.
+    /// Whether a residual within the widened threshold clears a flagged sensor.
     clears: bool,
     /// Whether something may be learned from it.
     teaches: bool,
@@ -53,11 +53,11 @@ impl Trust {
     };
 
     /// What a threshold is multiplied by. Where little is known, the wide threshold keeps a healthy
-    /// sensor from being accused, but an accused one is cleared by nothing less than the narrow one:
+    /// sensor from being flagged, but a flagged one is cleared by nothing less than the narrow one:
     /// its residual goes on being followed, since an estimate that stood still would leave the loop
     /// without feedback.
-    fn factor(&self, accused: bool) -> f64 {
-        if accused && !self.clears {
+    fn factor(&self, flagged: bool) -> f64 {
+        if flagged && !self.clears {
             1.0
         } else {
             self.widening
@@ -96,7 +96,7 @@ pub struct EstimatorState {
     judged: Vec<bool>,
     /// Per mode: the learned response to the periodic disturbance.
     harmonics: Vec<HarmonicState>,
-    /// Watches accused sensors for a wrongly learned disturbance.
+    /// Watches flagged sensors for a wrongly learned disturbance.
     recovery: Option<Recovery>,
     /// Per mode: the adapted response; empty unless adaptation is on.
     adaptations: Vec<Adaptation>,
@@ -173,7 +173,7 @@ impl EstimatorState {
     }
 
     /// Called on leaving mode `from` for mode `to`: the regressor mixes modes for `response_length`
-    /// samples, and a mode never learned in starts from what the other taught.
+    /// samples, and a mode never learned in starts from what was learned in the other.
     pub fn mode_entered(
         &mut self,
         estimator: &Estimator,
@@ -217,14 +217,14 @@ impl EstimatorState {
         }
     }
 
-    /// Which sensors (p) are accused and could not be judged anew, so that their estimate stands still.
+    /// Which sensors (p) are flagged and could not be judged anew, so that their estimate stands still.
     pub fn held<'a>(&'a self, estimator: &Estimator) -> impl Iterator<Item = bool> + Clone + 'a {
         let reference = estimator.method == EstimatorMethod::Reference;
         let sensors = self.flagged.iter().zip(&self.judged);
         sensors.map(move |(&flagged, &judged)| reference && flagged && !judged)
     }
 
-    /// Whether an accused sensor has no trusted prediction to stand in for it.
+    /// Whether a flagged sensor has no trusted prediction to stand in for it.
     pub fn leans_on_the_model(&self, estimator: &Estimator) -> bool {
         if estimator.method == EstimatorMethod::Observer {
             return false;
@@ -377,7 +377,7 @@ impl EstimatorState {
         }
     }
 
-    /// Replaces what was learned of accused sensors that showed nothing but the disturbance for a
+    /// Replaces what was learned of flagged sensors that showed nothing but the disturbance for a
     /// period; says whether there were any.
     fn reconsider(&mut self, estimator: &Estimator, seen: &Observation<'_>) -> bool {
         let (Some(recovery), Some(known)) = (&mut self.recovery, &estimator.harmonics) else {

@@ -37,7 +37,7 @@ impl InputHistory {
         }
     }
 
-    /// Appends the input that acts over the coming sample (m) and forgets the oldest.
+    /// Appends the input that acts over the coming sample (m) and drops the oldest.
     pub fn push(&mut self, acting: &[f64]) {
         if self.inputs.len() < self.width {
             return;

@@ -24,12 +24,12 @@ pub struct Recovery {
     /// Weighted sum of squared errors per sensor (p).
     unexplained: Vec<f64>,
     /// Sensors called faulty at some time in this period (p).
-    accused: Vec<bool>,
+    was_flagged: Vec<bool>,
     samples: u64,
 }
 
 crate::state!(Recovery {
-    parts: [fit, regressor, unexplained, accused],
+    parts: [fit, regressor, unexplained, was_flagged],
     constants: [],
     counters: [samples]
 });
@@ -42,16 +42,16 @@ impl Recovery {
             fit: LeastSquares::with_variance(outputs, size, TUNING.recovery_variance),
             regressor: vec![0.0; size],
             unexplained: vec![0.0; outputs],
-            accused: vec![false; outputs],
+            was_flagged: vec![false; outputs],
             samples: 0,
         }
     }
 
-    /// Forgets the period begun.
+    /// Drops the period begun.
     pub fn restart(&mut self) {
         self.fit.restart(TUNING.recovery_variance);
         self.unexplained.fill(0.0);
-        self.accused.fill(false);
+        self.was_flagged.fill(false);
         self.samples = 0;
     }
 
@@ -70,13 +70,13 @@ impl Recovery {
         self.fit.aim(&self.regressor);
         let leverage = self.fit.leverage(&self.regressor);
         let scale = 1.0 / (1.0 + leverage);
-        let sums = self.unexplained.iter_mut().zip(&mut self.accused);
+        let sums = self.unexplained.iter_mut().zip(&mut self.was_flagged);
         let mut signals = sensors.zip(sums);
         self.fit.learn(leverage, 1.0, |row| {
-            let Some(((value, flagged), (sum, accused))) = signals.next() else {
+            let Some(((value, flagged), (sum, was_flagged))) = signals.next() else {
                 return 0.0;
             };
-            *accused |= flagged;
+            *was_flagged |= flagged;
             let error = kernel::bounded(value) - kernel::dot(row, &self.regressor);
             // The squared error after the fit, by the recursion of least squares.
             *sum = kernel::bounded(*sum + scale * error * error);
@@ -94,7 +94,7 @@ impl Recovery {
         let limit = TUNING.recovery_share * threshold;
         let no_bias = constant.abs() <= limit || !settled;
         let explained = mean_square <= limit * limit;
-        (no_bias && explained && *self.accused.get(sensor)?).then_some(waves)
+        (no_bias && explained && *self.was_flagged.get(sensor)?).then_some(waves)
     }
 }
 

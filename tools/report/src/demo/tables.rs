@@ -88,7 +88,7 @@ fn explanation(variant: Variant) -> &'static str {
         Variant::Additive => {
             "the additive FTC of the paper’s section III: no attenuation of the disturbance"
         }
-        Variant::NoFtc => "the same gains, believing every sensor",
+        Variant::NoFtc => "the same gains without fault compensation",
     }
 }
 

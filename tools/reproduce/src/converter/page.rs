@@ -116,7 +116,7 @@ fn lead(trials: &[Trial]) -> String {
     format!(
         "A three-phase PWM rectifier holds its DC voltage and reactive current while its load doubles and pulsates; one of \
          the two sensors fails for half of the time. The proposed controller estimates the fault and takes it out of the \
-         measurement; model predictive control (MPC) has the same model, noise and limits, but believes its sensors. With a \
+         measurement; model predictive control (MPC) has the same model, noise and limits, but no fault compensation. With a \
          fault the proposed controller follows the reference clearly better in {} of {} cases.",
         ahead(trials),
         faulty(trials).count()
