@@ -225,7 +225,9 @@ fn capped(run: &RunWatch<'_>) -> Vec<RunWarning> {
 
 /// Sensors that were mostly believed while their faults were large.
 fn unnoticed(run: &RunWatch<'_>) -> Vec<RunWarning> {
-    if run.design.controller.estimator.method == EstimatorMethod::None {
+    let without = run.design.controller.estimator.method == EstimatorMethod::None;
+    // What could not be judged is told already.
+    if without || !unjudged(run).is_empty() {
         return Vec::new();
     }
     let sensors = run.large.iter().enumerate();
