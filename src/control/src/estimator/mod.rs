@@ -33,23 +33,23 @@ use super::parameters::{Estimator, EstimatorMethod};
 use hypotheses::BankState;
 use serde::{Deserialize, Serialize};
 
-/// How far a residual can be trusted.
+/// How far a residual is valid.
 #[derive(Clone, Copy, Debug)]
-struct Trust {
+struct Validity {
     /// By how much its threshold is widened: the prediction's deviation over that of the noise.
     widening: f64,
     /// Whether a residual within the widened threshold clears a flagged sensor.
     clears: bool,
     /// Whether something may be learned from it.
-    teaches: bool,
+    informs: bool,
 }
 
-impl Trust {
+impl Validity {
     /// As much as a threshold assumes.
     const FULL: Self = Self {
         widening: 1.0,
         clears: true,
-        teaches: true,
+        informs: true,
     };
 
     /// What a threshold is multiplied by. Where little is known, the wide threshold keeps a healthy
@@ -248,7 +248,7 @@ impl EstimatorState {
         for (q, (((fault, flagged), residual), (((&y, &left), &expected), &largest))) in
             sensors.zip(said).enumerate()
         {
-            *flagged = hypotheses::has(bank.accused, q);
+            *flagged = hypotheses::has(bank.flagged, q);
             if !is_measurement(y) {
                 *fault = 0.0;
                 continue;
@@ -265,12 +265,12 @@ impl EstimatorState {
     /// Judges one sample, sensor by sensor.
     pub fn observe(&mut self, estimator: &Estimator, seen: &Observation<'_>) {
         self.history.regress(seen.u0);
-        let trust = match estimator.method {
+        let validity = match estimator.method {
             EstimatorMethod::Reference => self.predict(estimator, seen),
             EstimatorMethod::Sliding => self.slide(seen),
             EstimatorMethod::Observer | EstimatorMethod::None => None,
         };
-        let healthy = self.decide(estimator, seen, trust);
+        let healthy = self.decide(estimator, seen, validity);
         let corrected = self.reconsider(estimator, seen);
         if healthy && !corrected {
             self.learn(estimator, seen.mode);
@@ -311,9 +311,9 @@ impl EstimatorState {
         }
     }
 
-    /// The reference window: leaves prediction and residual, and returns how far to trust them;
+    /// The reference window: leaves prediction and residual, and returns how far to validity them;
     /// nothing while the regressor mixes modes.
-    fn predict(&mut self, estimator: &Estimator, seen: &Observation<'_>) -> Option<Trust> {
+    fn predict(&mut self, estimator: &Estimator, seen: &Observation<'_>) -> Option<Validity> {
         self.judged.fill(false);
         let predictor = estimator.predictors.get(seen.mode)?;
         kernel::affine(
@@ -354,12 +354,12 @@ impl EstimatorState {
             *judged = self.hold == 0 && (spanned || precise);
         }
         let most = 1.0 + estimator.leverage_limit;
-        let trust = Trust {
+        let validity = Validity {
             widening: libm::sqrt(spread),
             clears: spread <= most,
-            teaches: spanned,
+            informs: spanned,
         };
-        (self.hold == 0).then_some(trust)
+        (self.hold == 0).then_some(validity)
     }
 
     /// Takes a healthy sample in: the response to the disturbance first, the plant's own response
@@ -412,12 +412,12 @@ impl EstimatorState {
     }
 
     /// The sliding window as printed: leaves the residual; nothing until the window is full.
-    fn slide(&mut self, seen: &Observation<'_>) -> Option<Trust> {
+    fn slide(&mut self, seen: &Observation<'_>) -> Option<Validity> {
         self.judged.fill(false);
         let window = self.window.as_mut().filter(|_| self.hold == 0)?;
         window.residual(self.history.regressor(), seen.y, &mut self.residual);
         self.judged.fill(window.full());
-        window.full().then_some(Trust::FULL)
+        window.full().then_some(Validity::FULL)
     }
 
     /// Remembers the input that acts over the coming sample (m).
@@ -425,15 +425,15 @@ impl EstimatorState {
         self.history.push(acting);
     }
 
-    /// Decides sensor by sensor; `trust` is absent when the residual means nothing now.
+    /// Decides sensor by sensor; `validity` is absent when the residual means nothing now.
     /// Returns whether the residual was judged and every sensor found healthy beyond suspicion.
     fn decide(
         &mut self,
         estimator: &Estimator,
         seen: &Observation<'_>,
-        trust: Option<Trust>,
+        validity: Option<Validity>,
     ) -> bool {
-        let mut healthy = trust.is_some_and(|trust| trust.teaches);
+        let mut healthy = validity.is_some_and(|validity| validity.informs);
         let sensors = self
             .decisions
             .iter_mut()
@@ -446,11 +446,12 @@ impl EstimatorState {
             .zip(seen.thresholds.iter().zip(&estimator.largest_fault));
         for (((decision, fault), (flagged, &judged)), signals) in sensors.zip(signals) {
             let ((&value, &residual), (&threshold, &largest)) = signals;
-            let trust = trust.filter(|_| judged);
+            let validity = validity.filter(|_| judged);
             let verdict = if !is_measurement(value) {
                 Some(Verdict::Lost)
             } else {
-                trust.map(|trust| Verdict::of(residual, trust.factor(*flagged) * threshold))
+                validity
+                    .map(|validity| Verdict::of(residual, validity.factor(*flagged) * threshold))
             };
             let Some(verdict) = verdict else { continue };
             decision.update(verdict, estimator.debounce);
@@ -460,7 +461,7 @@ impl EstimatorState {
                 (true, Verdict::Lost) => *fault,
                 (true, _) => residual.clamp(-largest, largest),
             };
-            let quiet = trust
+            let quiet = validity
                 .is_some_and(|t| residual.abs() <= TUNING.learning_share * t.widening * threshold);
             healthy &= !*flagged && verdict == Verdict::Healthy && quiet;
         }

@@ -132,7 +132,7 @@ mod tests {
     }
 
     #[test]
-    fn history_forgets_the_oldest_input() {
+    fn the_history_drops_the_oldest_input() {
         let mut history = InputHistory::new(&[0.5, 1.5], 2);
         history.push(&[2.0, 3.0]);
         history.regress(&[1.0, 1.0]);

@@ -8,7 +8,7 @@ use alloc::vec;
 use alloc::vec::Vec;
 use serde::{Deserialize, Serialize};
 
-/// How far the explanation by the model and healthy sensors may fall: it is never forgotten.
+/// How far the explanation by the model and healthy sensors may fall: it is always kept.
 const MEMORY: f64 = 30.0;
 /// Hypotheses about the same sensors.
 const ALIKE: usize = 2;
@@ -37,7 +37,7 @@ pub(super) enum Action {
     /// The plant is the model again.
     Tighten,
     /// These sensors have a bias.
-    Accuse(Sensors),
+    Bias(Sensors),
     /// This sensor's gain is wrong.
     Scale(usize),
     /// The faults of these sensors jump.
@@ -170,7 +170,7 @@ impl Bank {
                 stuck: 0,
                 scaled: 0,
             },
-            Action::Accuse(set) | Action::Change(set) => {
+            Action::Bias(set) | Action::Change(set) => {
                 let rest = now.without(set);
                 Kinds {
                     additive: rest.additive | set,
@@ -195,7 +195,7 @@ impl Bank {
         }
     }
 
-    /// Whom a candidate accuses, whether the plant is no longer the model, and the plant's mode.
+    /// Which sensors a candidate takes for faulty, whether the plant is no longer the model, and the plant's mode.
     fn kind(&self, state: &BankState, candidate: &Candidate) -> (Sensors, bool, u32) {
         let parent = &state.slots[candidate.parent];
         let loose = match candidate.action {
@@ -203,12 +203,12 @@ impl Bank {
             Action::Tighten => false,
             _ => parent.loose,
         };
-        let accused = self.sets(parent, candidate.action).all();
-        (accused, loose, parent.mode)
+        let flagged = self.sets(parent, candidate.action).all();
+        (flagged, loose, parent.mode)
     }
 
     /// Keeps the best candidates, few of a kind, and always one in which the plant is the model and no sensor
-    /// is accused.
+    /// is flagged.
     fn select(&self, state: &mut BankState) {
         let order = |a: &Candidate, b: &Candidate| {
             b.score.total_cmp(&a.score).then(a.parent.cmp(&b.parent))
@@ -221,17 +221,17 @@ impl Bank {
             .filter(|c| c.convinced)
             .map(|c| c.score)
             .fold(f64::NEG_INFINITY, f64::max);
-        // What has fallen further than a new fault costs, and the odds of an accusation, is dropped.
+        // What has fallen further than a new fault costs, and the odds of a sensor fault, is dropped.
         let margin = self.settings.odds - self.prices.fault.min(self.prices.load);
         let mut kept = 0;
         let mut plain = false;
         for index in 0..state.candidates.count {
             let candidate = state.candidates.list[index];
             let kind = self.kind(state, &candidate);
-            let unaccused = (kind.0, kind.1) == (0, false);
+            let unflagged = (kind.0, kind.1) == (0, false);
             let room = KEEP - usize::from(!plain);
             let stays = candidate.score >= best - margin && kept < room;
-            if !stays && (plain || !unaccused) {
+            if !stays && (plain || !unflagged) {
                 continue;
             }
             let alike = state.candidates.list[..kept]
@@ -241,7 +241,7 @@ impl Bank {
             if alike >= ALIKE || self.is_twin(state, &candidate, kept) {
                 continue;
             }
-            plain |= unaccused;
+            plain |= unflagged;
             let mut taken = candidate;
             taken.score = (candidate.score - best).clamp(-MEMORY, MEMORY);
             state.candidates.list[kept] = taken;
@@ -295,7 +295,7 @@ impl Bank {
             self.learn_from(state, usize::from(next.list[index]), index);
         }
         state.live = next;
-        self.believe(state, reading);
+        self.decide(state, reading);
     }
 
     /// The hypothesis in `slot`, which comes of the candidate `index`, takes the sample in.
@@ -307,7 +307,7 @@ impl Bank {
         let price = match candidate.action {
             Action::Stay | Action::Tighten | Action::Release(_) => 0.0,
             Action::Load(_) | Action::Loosen => 0.0,
-            Action::Accuse(_)
+            Action::Bias(_)
             | Action::Scale(_)
             | Action::Freeze(_)
             | Action::Start
@@ -320,20 +320,20 @@ impl Bank {
         h.convinced = candidate.convinced;
     }
 
-    /// Whom to believe: an accusation must beat the best explanation without one by its odds.
-    fn believe(&self, state: &mut BankState, reading: Reading<'_>) {
+    /// Which hypothesis is used: one with a sensor fault must beat the best one without by its odds.
+    fn decide(&self, state: &mut BankState, reading: Reading<'_>) {
         let (p, fault) = (self.layout.p, self.layout.fault());
         let mode = self.decide_mode(state);
         let mut best = state.live.first();
         let mut top = f64::NEG_INFINITY;
         for slot in state.live.slots() {
             let h = &state.slots[slot];
-            let value = if h.accused() == 0 || self.settings.trusts_model() {
+            let value = if h.flagged() == 0 || self.settings.trusts_model() {
                 h.score
             } else {
                 h.score - self.settings.odds
             };
-            let fits = h.accused() == 0
+            let fits = h.flagged() == 0
                 || h.misfit < 3.0 * p as f64 + 6.0
                     && state.seen[slot].square < 20.0 + 4.0 * p as f64;
             if h.convinced && fits && h.mode as usize == mode && value > top {
@@ -343,14 +343,14 @@ impl Bank {
         }
         state.best = best;
         state.suspect = 0;
-        let decided = state.slots[best].accused();
+        let decided = state.slots[best].flagged();
         for slot in state.live.slots() {
             let h = &state.slots[slot];
             if h.score < state.slots[best].score {
                 continue;
             }
             for q in 0..p {
-                if has(h.accused() & !decided, q)
+                if has(h.flagged() & !decided, q)
                     && (!has(h.additive, q) || h.z[fault + q].abs() > 6.0 * reading.noise[q])
                 {
                     state.suspect |= 1 << q;

@@ -30,7 +30,7 @@ impl Bank {
                 let jump = &model.jumps[jump];
                 child.jump(layout, model, jump, &state.u, settings.gain_error);
             }
-            Action::Accuse(set) | Action::Change(set) => {
+            Action::Bias(set) | Action::Change(set) => {
                 for q in (0..p).filter(|&q| has(set, q)) {
                     let k = fault + q;
                     let additive = self.output_error() || has(parent.additive, q);
@@ -62,7 +62,7 @@ impl Bank {
                     child.open(k, x, run.variance(model, settings, k));
                     child.before[k] = x;
                 }
-                self.forget_loads(child, model, run);
+                self.reset_loads(child, model, run);
                 for q in 0..p {
                     let variance = match has(child.additive, q) {
                         true => self.fault_variance(q),
@@ -88,7 +88,7 @@ impl Bank {
     }
 
     /// Loads and errors of the input gains are those of the model's `run`.
-    fn forget_loads(&self, h: &mut Hypothesis, model: &ModeModel, run: &OwnRun) {
+    fn reset_loads(&self, h: &mut Hypothesis, model: &ModeModel, run: &OwnRun) {
         for (k, size) in model.load_size.iter().enumerate() {
             let k = self.layout.load() + k;
             h.open(k, run.load(k), REMAINS * size * size);

@@ -40,7 +40,7 @@ pub struct Hypothesis {
     pub stuck: Sensors,
     /// Sensors whose gain is wrong.
     pub scaled: Sensors,
-    /// Whether what accuses its sensors could be nothing else.
+    /// Whether nothing but a fault of its sensors could explain the readings that began it.
     pub convinced: bool,
     /// Whether the plant is no longer the model.
     pub loose: bool,
@@ -300,8 +300,8 @@ impl Hypothesis {
         }
     }
 
-    /// Everyone accused.
-    pub const fn accused(&self) -> Sensors {
+    /// All sensors that it takes for faulty.
+    pub const fn flagged(&self) -> Sensors {
         self.additive | self.stuck | self.scaled
     }
 
@@ -334,7 +334,7 @@ impl Hypothesis {
 
     /// How many entries of the state are in use.
     pub fn active(&self, layout: Layout, bias: bool) -> usize {
-        if bias || self.accused() != 0 {
+        if bias || self.flagged() != 0 {
             layout.size()
         } else {
             layout.fault()
@@ -496,7 +496,7 @@ impl Hypothesis {
 
     /// Faults wander.
     fn wander(&mut self, step: &Step<'_>) {
-        if self.accused() == 0 {
+        if self.flagged() == 0 {
             return;
         }
         let (stride, fault) = (step.layout.stride(), step.layout.fault());
@@ -556,7 +556,7 @@ impl Hypothesis {
         }
         for k in fault..active {
             let size = step.settings.fault_size[k - fault];
-            let most = match has(self.accused(), k - fault) {
+            let most = match has(self.flagged(), k - fault) {
                 true => 2.0 * size * size,
                 false => model.most[k],
             };

@@ -6,10 +6,10 @@
 //! bias, a wrong gain, a frozen value), changed their fault, or recovered. Each of these has a
 //! probability per sample, and the likelihood of the readings decides between what they leave.
 //!
-//! An accusation counts where a sensor's reading left what is expected of it within one sample, or
+//! A sensor fault counts where the sensor's reading left what is expected of it within one sample, or
 //! repeats one value while the model moves, and where it beats the best explanation without one by
 //! given odds. What grows slowly can be a load or a sensor's drift: `suspect` names the sensors, and
-//! the policy decides. Where no hypothesis fits, the sensors are believed and `model_valid` is false.
+//! the policy decides. Where no hypothesis fits, the readings are used as they are and `model_valid` is false.
 
 mod competition;
 mod effect;
@@ -184,10 +184,10 @@ pub struct BankState {
     usual: OwnRun,
     /// Outputs that the leading hypothesis expects of healthy sensors (p).
     pub expected: Vec<f64>,
-    /// What the readings leave unexplained; of an accused sensor its fault (p).
+    /// What the readings leave unexplained; of a flagged sensor its fault (p).
     pub residual: Vec<f64>,
     /// Sensors whose reading is not used.
-    pub accused: Sensors,
+    pub flagged: Sensors,
     /// Sensors whose slow divergence could be a fault.
     pub suspect: Sensors,
     /// Whether the model explains the readings.
@@ -235,7 +235,7 @@ crate::state!(BankState {
         best,
         apart,
         misfit,
-        accused,
+        flagged,
         suspect,
         model_valid,
         actuator_fault
@@ -293,7 +293,7 @@ impl Bank {
             state.seen[slot].whiten(p);
         }
         let h = &state.slots[head];
-        let calm = h.accused() == 0
+        let calm = h.flagged() == 0
             && !h.loose
             && state.seen[head].square < QUIET + 2.0 * p as f64
             && state.seen[head].sound
@@ -317,23 +317,23 @@ impl Bank {
         state.own.learn(&state.expected);
         state.usual.learn(&state.expected);
         let best = &state.slots[state.best];
-        if best.accused() == 0 && !best.loose {
+        if best.flagged() == 0 && !best.loose {
             state.usual.learn_loads(layout, &best.z);
         }
-        state.suspect |= displaced & !state.slots[state.best].accused();
+        state.suspect |= displaced & !state.slots[state.best].flagged();
     }
 
-    /// Noise of the sensors that are believed, from the innovations of the leading hypothesis: the mean
+    /// Noise of the sensors that are used, from the innovations of the leading hypothesis: the mean
     /// of the noise's square given the reading. The design's noise is the least.
     fn learn_noise(&self, state: &mut BankState, reading: Reading<'_>) {
         let p = self.layout.p;
-        let (seen, accused) = (&state.seen[state.best], state.slots[state.best].accused());
+        let (seen, flagged) = (&state.seen[state.best], state.slots[state.best].flagged());
         if !seen.sound {
             return;
         }
         state.noise_samples = (state.noise_samples + 1.0).min(NOISE_MEMORY);
         for q in 0..p {
-            if !has(reading.valid & !accused, q) {
+            if !has(reading.valid & !flagged, q) {
                 continue;
             }
             let factor = &seen.s[q * p..=q * p + q];
@@ -416,9 +416,9 @@ impl Bank {
             *expected = model.output(q, &h.z, &h.z);
         }
         let all = if p >= 64 { u64::MAX } else { (1 << p) - 1 };
-        state.accused = h.accused() | (all & !reading.valid);
+        state.flagged = h.flagged() | (all & !reading.valid);
         for q in 0..p {
-            state.residual[q] = if has(h.accused(), q) {
+            state.residual[q] = if has(h.flagged(), q) {
                 reading.y[q] - state.expected[q]
             } else {
                 state.seen[state.best].r[q]

@@ -146,7 +146,7 @@ impl Bank {
         }
     }
 
-    /// The mode (0-based) to believe in: another than before must have the odds of an accusation, all its
+    /// The mode (0-based) that is taken: another than before must have the odds of a sensor fault, all its
     /// hypotheses together.
     pub(super) fn decide_mode(&self, state: &mut BankState) -> usize {
         if self.others() == 0 {

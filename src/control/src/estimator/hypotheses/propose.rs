@@ -7,7 +7,7 @@ use super::own_run::OwnRun;
 use super::{APART, Bank, BankState, DISPLACED, FREEZING};
 
 /// What it costs per sample, in log likelihood, that a fault has come to nothing and yet is there: after two
-/// hundred or so it is forgotten.
+/// hundred or so it has no influence any more.
 const FADING: f64 = 0.05;
 
 /// The hypothesis to which something may have happened.
@@ -18,7 +18,7 @@ struct Parent {
     score: f64,
     /// After it, if all goes on.
     stay: f64,
-    accused: Sensors,
+    flagged: Sensors,
     stuck: Sensors,
     loose: bool,
     convinced: bool,
@@ -53,7 +53,7 @@ impl Bank {
             slot,
             score: h.score,
             stay: h.score + seen.likelihood(p),
-            accused: h.accused(),
+            flagged: h.flagged(),
             stuck: h.stuck,
             loose: h.loose,
             convinced: h.convinced,
@@ -74,7 +74,7 @@ impl Bank {
     /// Whether the faults of a hypothesis, biases all of them, are none any more.
     fn has_come_to_nothing(&self, h: &Hypothesis, reading: Reading<'_>) -> bool {
         let (fault, stride) = (self.layout.fault(), self.layout.stride());
-        let biases = h.additive != 0 && h.additive == h.accused() && h.convinced;
+        let biases = h.additive != 0 && h.additive == h.flagged() && h.convinced;
         let mut faults = (0..self.layout.p).filter(|&q| has(h.additive, q));
         biases
             && faults.all(|q| {
@@ -85,21 +85,21 @@ impl Bank {
     }
 
     /// Whether another hypothesis with at least this `score` after the sample, which says of the sensors in
-    /// `accused` alone that they have a bias, leaves of the readings what `r` (p) leaves.
+    /// `flagged` alone that they have a bias, leaves of the readings what `r` (p) leaves.
     fn is_said_already(
         &self,
         state: &BankState,
         parent: Parent,
         r: &[f64],
-        accused: Sensors,
+        flagged: Sensors,
         score: f64,
     ) -> bool {
         let p = self.layout.p;
         state.live.slots().any(|slot| {
             let (h, seen) = (&state.slots[slot], &state.seen[slot]);
             slot != parent.slot
-                && h.accused() == accused
-                && h.additive == accused
+                && h.flagged() == flagged
+                && h.additive == flagged
                 && h.convinced
                 && (h.loose, h.mode) == (parent.loose, state.slots[parent.slot].mode)
                 && h.score + seen.likelihood(p) >= score
@@ -107,7 +107,7 @@ impl Bank {
         })
     }
 
-    /// Adds a candidate with the logarithm of its probability; an accusation is convinced only where the
+    /// Adds a candidate with the logarithm of its probability; a fault counts as convinced only where the
     /// sample speaks for it at once.
     fn consider(
         &self,
@@ -118,8 +118,8 @@ impl Bank {
         (action, price, convinced): (Action, f64, bool),
     ) {
         let score = parent.score + price + self.trial(state, parent.slot, model, reading, action);
-        let accuses = matches!(action, Action::Accuse(_) | Action::Scale(_));
-        let at_once = !accuses || self.settings.trusts_model() || score > parent.stay;
+        let by_residual = matches!(action, Action::Bias(_) | Action::Scale(_));
+        let at_once = !by_residual || self.settings.trusts_model() || score > parent.stay;
         state
             .candidates
             .add(parent.then(action, score, convinced && at_once));
@@ -157,7 +157,7 @@ impl Bank {
             state.candidates.add(tight);
         }
         if state.first {
-            if parent.accused == 0 {
+            if parent.flagged == 0 {
                 consider(state, Action::Start, prices.fault);
             }
             return;
@@ -172,7 +172,7 @@ impl Bank {
                 consider(state, back, (prices.fault + against).min(0.0));
             }
         }
-        if parent.accused == 0 {
+        if parent.flagged == 0 {
             self.propose_drift(state, parent, model, reading);
         }
     }
@@ -218,7 +218,7 @@ impl Bank {
             return;
         }
         let p = self.layout.p;
-        let free = sensors(p) & !parent.accused & reading.valid;
+        let free = sensors(p) & !parent.flagged & reading.valid;
         let price = if state.first {
             AT_START
         } else {
@@ -229,16 +229,16 @@ impl Bank {
             self.consider(state, parent, model, reading, told);
         };
         for q in (0..p).filter(|&q| has(free, q)) {
-            consider(Action::Accuse(1 << q), price);
+            consider(Action::Bias(1 << q), price);
             consider(Action::Scale(q), price);
             if p > 2 && p <= 4 {
                 for other in (0..q).filter(|&other| has(free, other)) {
-                    consider(Action::Accuse(1 << q | 1 << other), TOGETHER * price);
+                    consider(Action::Bias(1 << q | 1 << other), TOGETHER * price);
                 }
             }
         }
         if free.count_ones() > 1 {
-            consider(Action::Accuse(free), TOGETHER * price);
+            consider(Action::Bias(free), TOGETHER * price);
         }
     }
 
@@ -252,7 +252,7 @@ impl Bank {
     ) {
         let (p, prices) = (self.layout.p, self.prices);
         let leads = parent.slot == state.live.first();
-        let known = parent.accused & reading.valid;
+        let known = parent.flagged & reading.valid;
         for q in 0..p {
             let may_freeze = has(sensors(p) & !parent.stuck & reading.valid, q);
             if may_freeze && leads && state.evidence[q] > FREEZING {
@@ -267,7 +267,7 @@ impl Bank {
                 let change = (Action::Change(1 << q), prices.change, parent.convinced);
                 self.consider(state, parent, model, reading, change);
             }
-            let last = parent.accused.count_ones() == 1;
+            let last = parent.flagged.count_ones() == 1;
             let convinced = parent.convinced || last;
             self.propose_release(
                 state,
@@ -278,7 +278,7 @@ impl Bank {
             );
         }
         if known.count_ones() > 1 {
-            let all = (parent.accused, TOGETHER * prices.release, true);
+            let all = (parent.flagged, TOGETHER * prices.release, true);
             self.propose_release(state, parent, model, reading, all);
         }
     }
@@ -308,7 +308,7 @@ impl Bank {
         let action = Action::Release(set);
         let value = self.trial(state, parent.slot, model, reading, action);
         let score = parent.score + price + value;
-        let left = parent.accused & !set;
+        let left = parent.flagged & !set;
         if !self.is_said_already(state, parent, &state.trial.r, left, score) {
             state.candidates.add(parent.then(action, score, convinced));
         }

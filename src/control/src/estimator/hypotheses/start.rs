@@ -272,7 +272,7 @@ impl Bank {
             usual: OwnRun::new(model, settings, layout.size()),
             expected: vec![0.0; p],
             residual: vec![0.0; p],
-            accused: 0,
+            flagged: 0,
             suspect: 0,
             model_valid: true,
             load: vec![0.0; m],

@@ -187,7 +187,7 @@ impl Bank {
                     jump.seen[q * p + j] + gains.sum::<f64>()
                 });
             }
-            Action::Accuse(set) | Action::Change(set) | Action::Drift(set) => {
+            Action::Bias(set) | Action::Change(set) | Action::Drift(set) => {
                 for q in (0..p).filter(|&q| has(set & reading.valid, q)) {
                     s[q * p + q] += settings.fault_size[q] * settings.fault_size[q];
                 }
