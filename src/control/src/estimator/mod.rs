@@ -311,7 +311,7 @@ impl EstimatorState {
         }
     }
 
-    /// The reference window: leaves prediction and residual, and returns how far to validity them;
+    /// The reference window: leaves prediction and residual, and returns how far they are valid;
     /// nothing while the regressor mixes modes.
     fn predict(&mut self, estimator: &Estimator, seen: &Observation<'_>) -> Option<Validity> {
         self.judged.fill(false);
