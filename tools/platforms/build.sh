@@ -65,8 +65,6 @@ for platform in "$@"; do
         export CARGO_TARGET_X86_64_PC_WINDOWS_GNU_LINKER=x86_64-w64-mingw32-gcc
         linking=(-Ctarget-feature=+crt-static)
         build x86_64-pc-windows-gnu "" cargo build
-        # The profile's `strip` leaves a third of the file, its table of symbols, in a DLL.
-        x86_64-w64-mingw32-strip "$built"/ftc_{controller,plant}_fmu.dll
         pack win64 "" dll
         ;;
     *)
