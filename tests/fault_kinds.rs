@@ -36,7 +36,7 @@ const WINDOWS: [(&str, f64, f64); 4] = [
 
 /// How far a fault of `sensors` that stays undetected can move a true output. It stays below its
 /// threshold beside what the disturbance does to that output, for which it can be taken, and has at
-/// every tick the sign that does most harm. The sum of the magnitudes of the believing loop's
+/// every tick the sign that does most harm. The sum of the magnitudes of the uncompensated loop's
 /// response to a fault of one tick, times that size, is the bound.
 fn unseen(sensors: &[usize]) -> f64 {
     let thresholds = controller(Channel::State, 0.005).estimator.thresholds;

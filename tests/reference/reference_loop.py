@@ -99,9 +99,9 @@ class Trust:
     clears: bool
     teaches: bool
 
-    def factor(self, *, accused: bool) -> float:
+    def factor(self, *, flagged: bool) -> float:
         """Returns what a threshold is multiplied by."""
-        return 1.0 if accused and not self.clears else self.widening
+        return 1.0 if flagged and not self.clears else self.widening
 
 
 @dataclass
@@ -208,7 +208,7 @@ class Estimator:
         self.hold = max(self.hold - 1, 0)
 
     def _reconsider(self, mode: int, h: np.ndarray, d: np.ndarray) -> bool:
-        """Refits accused sensors that, over one period without a hold, showed the disturbance and nothing else."""
+        """Refits flagged sensors that, over one period without a hold, showed the disturbance and nothing else."""
         if self.hold > 0 or not np.isfinite(d).all():
             self.period_seen.clear()
             return False
@@ -233,7 +233,7 @@ class Estimator:
             if present[i] and not self.judged[i]:
                 continue
             threshold = self.settings["thresholds"][i]
-            factor = trust.factor(accused=flag.up) if trust else 1.0
+            factor = trust.factor(flagged=flag.up) if trust else 1.0
             beyond = abs(self.residual[i]) > factor * threshold
             flag.vote(faulty=bool(beyond or not present[i]), lost=not present[i])
             largest = self.settings["largest_fault"][i]
@@ -384,8 +384,8 @@ class Loop:
             modelled = self.modes[mode].C @ model_run + self.modes[mode].c
             substitute = np.where(estimator.judged, estimator.y_hat, modelled)
             fault = self.trusted_fault(variant, estimator.f_hat, sensors.fault)
-            believed = heard if variant == "ftc" else y
-            y_c = np.where(np.isfinite(believed), believed - fault, substitute)
+            used = heard if variant == "ftc" else y
+            y_c = np.where(np.isfinite(used), used - fault, substitute)
             held = np.array([flag.up for flag in estimator.flags]) & ~estimator.judged
             if variant == "ftc" and self.design["controller"]["compensation"] == "virtual-sensor":
                 far = np.abs(y_c - modelled) > 4.0 * np.array(estimator.settings["thresholds"])

@@ -59,13 +59,13 @@ pub enum RunWarning {
         /// That size in physical units.
         size: f64,
     },
-    /// A sensor was mostly believed while its fault was large.
+    /// A sensor was used as it was in most samples of a large fault.
     Unnoticed {
         /// The sensor, from 0.
         sensor: usize,
-        /// Share of the samples with a large fault in which it was believed, 0 to 1.
+        /// Share of the samples with a large fault in which it was missed, 0 to 1.
         share: f64,
-        /// The largest fault that was believed, in physical units.
+        /// The largest fault that was missed, in physical units.
         largest: f64,
     },
     /// The noise of the sensors alone moves a command by a large part of its range.
@@ -223,7 +223,7 @@ fn capped(run: &RunWatch<'_>) -> Vec<RunWarning> {
         .collect()
 }
 
-/// Sensors that were mostly believed while their faults were large.
+/// Sensors whose large faults were missed in most samples.
 fn unnoticed(run: &RunWatch<'_>) -> Vec<RunWarning> {
     let without = run.design.controller.estimator.method == EstimatorMethod::None;
     // What could not be judged is told already.
@@ -235,7 +235,7 @@ fn unnoticed(run: &RunWatch<'_>) -> Vec<RunWarning> {
         .filter(|(_, large)| run.share(large.samples) > SHARE_CAPPED)
         .map(|(sensor, large)| RunWarning::Unnoticed {
             sensor,
-            share: large.believed as f64 / large.samples as f64,
+            share: large.missed as f64 / large.samples as f64,
             largest: large.largest,
         })
         .filter(|warning| matches!(warning, RunWarning::Unnoticed { share, .. } if *share > SHARE_UNNOTICED))
@@ -247,9 +247,9 @@ fn unnoticed(run: &RunWatch<'_>) -> Vec<RunWarning> {
 struct LargeFault {
     /// Samples with one.
     samples: usize,
-    /// Those in which the sensor was believed.
-    believed: usize,
-    /// The largest that was believed.
+    /// Those in which it was missed.
+    missed: usize,
+    /// The largest that was missed.
     largest: f64,
 }
 
@@ -261,7 +261,7 @@ impl LargeFault {
         }
         self.samples += 1;
         if !record.flagged[sensor] {
-            self.believed += 1;
+            self.missed += 1;
             self.largest = self.largest.max(fault);
         }
     }

@@ -240,7 +240,7 @@ fn healthy(statistics: &Statistics) -> Section {
         notes: vec![format!(
             "Of {} runs without a fault {} had a false alarm, and in {} the true error was more than 1 % larger than \
              without fault tolerance.",
-            healthy.runs, healthy.accused, healthy.worse_than_none
+            healthy.runs, healthy.flagged, healthy.worse_than_none
         )],
     };
     section.figures(vec![figure]).with(Block::Table(table))

@@ -75,7 +75,7 @@ pub struct Healthy {
     /// Runs in which fault tolerance did worse than none, by more than one percent.
     pub worse_than_none: u64,
     /// Runs in which a sensor was flagged.
-    pub accused: u64,
+    pub flagged: u64,
 }
 
 impl Healthy {
@@ -84,7 +84,7 @@ impl Healthy {
         self.error.add(error);
         self.over_none.add(over_none);
         self.worse_than_none += u64::from(over_none > 1.0 + WORSE);
-        self.accused += u64::from(flagged);
+        self.flagged += u64::from(flagged);
     }
 
     fn merge(&mut self, other: &Self) {
@@ -92,7 +92,7 @@ impl Healthy {
         self.error.merge(&other.error);
         self.over_none.merge(&other.over_none);
         self.worse_than_none += other.worse_than_none;
-        self.accused += other.accused;
+        self.flagged += other.flagged;
     }
 }
 

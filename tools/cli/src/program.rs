@@ -145,8 +145,8 @@ enum Command {
     },
     /// Run the design's scenario without any FMU: trajectories.csv, metrics.json, report.html and figures.
     ///
-    /// Runs it three times: with fault tolerance (ftc), with the same gains believing every
-    /// sensor (no_ftc), and with the same gains told the true fault (told_the_fault): an estimate
+    /// Runs it three times: with fault tolerance (ftc), with the same gains without fault
+    /// compensation (no_ftc), and with the same gains told the true fault (told_the_fault): an estimate
     /// that is perfect, yet takes up no disturbance and no noise.
     #[command(after_help = EXIT_CODES)]
     Simulate {

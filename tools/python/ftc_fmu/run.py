@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
 VARIANTS = {
     "ftc": "fault-tolerant",
-    "no_ftc": "believing every sensor",
+    "no_ftc": "without fault compensation",
     "told_the_fault": "told the true fault",
     "additive": "additive control as printed",
     "mpc": "model predictive control",

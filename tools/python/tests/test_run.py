@@ -81,7 +81,7 @@ def test_one_line(run: ftc.Run, paper: ftc.Design) -> None:
     assert repr(paper.controller()) == "<ftc_fmu.Controller: 2 sensors, 2 commands, ftc_enabled=True>"
 
 
-def test_a_fault_that_is_believed_is_told() -> None:
+def test_a_missed_fault_is_told() -> None:
     """A drift that could be the plant's is told with what takes it out; where that was done nothing is told."""
     inertia, stiffness, damping = 0.002, 25.0, 0.02
 
@@ -109,16 +109,16 @@ def test_a_fault_that_is_believed_is_told() -> None:
         "schedule": [{"from": 0.0, "mode": 1}, {"from": 2.0, "mode": 2}],
         "events": [drift],
     }
-    believed = ftc.design(plant, **keys).simulate(scenario)
-    (told,) = [warning for warning in believed.warnings if "was believed" in warning]
-    assert "a fault of load speed of up to 7.49 was believed in 100.0 %" in told
+    missed = ftc.design(plant, **keys).simulate(scenario)
+    (told,) = [warning for warning in missed.warnings if "was missed" in warning]
+    assert "a fault of load speed of up to 7.49 was missed in 100.0 %" in told
     assert "trust-model" in told
-    assert "on load torque" in str(believed), "the step on a disturbance that has a name"
+    assert "on load torque" in str(missed), "the step on a disturbance that has a name"
     assert "model_error" in told
     estimator = {"ambiguous": "trust-model", "model_error": 0.002}
     found = ftc.design(plant, **keys, estimator=estimator).simulate(scenario)
-    assert not any("was believed" in warning for warning in found.warnings)
-    errors = [run.metrics["ftc"]["mse"]["true"][0] for run in (believed, found)]
+    assert not any("was missed" in warning for warning in found.warnings)
+    errors = [run.metrics["ftc"]["mse"]["true"][0] for run in (missed, found)]
     assert errors[1] < 0.95 * errors[0]
 
 

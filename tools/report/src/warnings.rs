@@ -258,7 +258,7 @@ fn calmer(design: &Design) -> &'static str {
     }
 }
 
-/// What lets a fault be noticed that was believed.
+/// What lets a fault be noticed that was missed.
 fn missed(design: &Design) -> &'static str {
     match &design.controller.estimator.hypotheses {
         Some(settings) if settings.trusts_model() => {
@@ -316,7 +316,7 @@ fn of_run(design: &Design, calmer: &str, warning: &RunWarning) -> String {
             share,
             largest,
         } => format!(
-            "ftc: a fault of {} of up to {} was believed in {:.1} % of the samples that had one above three \
+            "ftc: a fault of {} of up to {} was missed in {:.1} % of the samples that had one above three \
              thresholds: {}",
             design.signals.outputs[sensor].name,
             number(largest),
