@@ -11,7 +11,7 @@ ZIG := target/platforms/zig
 FUZZER := cargo-fuzz@0.13.1
 TOOLS := $(CURDIR)/target/tools
 
-.PHONY: build fmu-linux64 fmu-all wheel test-wheel compare-platforms test test-rust test-python browser demo bench fuzz soak memcheck threadcheck lint package clean
+.PHONY: build fmu-linux64 fmu-all wheel test-wheel compare-platforms test test-rust test-python browser demo bench fuzz soak memcheck lint package clean
 
 # No path of this machine in what is built; the same flags everywhere, so that nothing is compiled twice.
 export CARGO_ENCODED_RUSTFLAGS := $(shell tools/platforms/remap.sh)
@@ -131,11 +131,7 @@ soak:
 # valgrind over the C programs of tests/c on both FMUs: its memcheck on one instance and its twin,
 # its two checkers of threads on eight threads with two loops each.
 memcheck: build $(VENV)/ready
-	PYTHONPATH=tests/support $(IN_VENV)python tests/support/c_host.py memcheck examples/paper.toml
-
-threadcheck: build $(VENV)/ready
-	PYTHONPATH=tests/support $(IN_VENV)python tests/support/c_host.py helgrind examples/paper.toml
-	PYTHONPATH=tests/support $(IN_VENV)python tests/support/c_host.py drd examples/paper.toml
+	PYTHONPATH=tests/support $(IN_VENV)python tests/support/c_host.py examples/paper.toml
 
 lint: $(VENV)/ready
 	cargo fmt --all --check

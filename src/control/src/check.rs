@@ -4,8 +4,8 @@ use crate::error::ControllerError;
 use crate::estimator::hypotheses::MOST_MODES;
 use crate::matrix::Matrix;
 use crate::parameters::{
-    ControllerParameters, Estimator, EstimatorMethod, Harmonics, Hypotheses, Limits, Observer,
-    Predictor, StateFeedback,
+    ControllerParameters, Estimator, EstimatorMethod, Harmonics, Hypotheses, Limits,
+    MOST_HARMONICS, Observer, Predictor, StateFeedback,
 };
 use alloc::format;
 use alloc::string::String;
@@ -209,9 +209,6 @@ const LONGEST: usize = 100_000;
 /// Most numbers in a window: its length times inputs times response length.
 const LARGEST_WINDOW: usize = 10_000_000;
 
-/// Most harmonics of a known disturbance.
-const MOST_HARMONICS: usize = 256;
-
 /// Most states that the hypotheses of the state-based method estimate together.
 const LARGEST_JOINT_STATE: usize = 1000;
 
@@ -247,7 +244,7 @@ impl Estimator {
                 "estimator.harmonics.count",
                 harmonics,
                 MOST_HARMONICS,
-                "must be at most 256",
+                "must be at most 50",
             ),
         ] {
             range(found <= most, field, rule)?;

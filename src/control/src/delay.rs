@@ -11,25 +11,10 @@ use super::kernel;
 use super::observer::{ObservedMode, ObserverState};
 use super::parameters::Observer;
 use crate::matrix::Matrix;
+use crate::tuning::DELAY;
 use alloc::vec;
 use alloc::vec::Vec;
 use serde::{Deserialize, Serialize};
-
-/// Samples, at least, before anything is said.
-const LEAST: u32 = 20;
-
-/// Samples after which it is left undecided.
-const MOST: u32 = 500;
-
-/// The logarithm of the likelihood ratio at which a delay is reported: a chance of `e^-30`.
-const CERTAIN: f64 = 30.0;
-
-/// How many times smaller the squares of some output must be: a model that is a little wrong fits a
-/// wrong delay better by less than this.
-const SMALLER: f64 = 5.0;
-
-/// What counts as no innovation, relative to the squares of the readings.
-const NOTHING: f64 = 1e-20;
 
 /// A delay that the readings fit, other than the one designed for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -157,7 +142,7 @@ impl DelayWatch {
         }
         kernel::copy(&mut self.acted, commands.designed);
         self.samples += u32::from(moved);
-        if self.samples >= LEAST {
+        if self.samples >= DELAY.least_samples {
             self.decide();
         }
     }
@@ -166,23 +151,24 @@ impl DelayWatch {
         let Some((designed, others)) = self.runs.split_first() else {
             return;
         };
-        let smaller = libm::log(SMALLER);
+        let smaller = libm::log(DELAY.squares_ratio);
         let (mut found, mut lead, mut all_worse) = (None, 0.0, true);
         for (at, delay) in [Delay::Longer, Delay::Shorter].into_iter().enumerate() {
             let Some(other) = others.get(at) else { break };
             let fit = self.compare(designed, other);
-            all_worse &= -fit.ratio > CERTAIN && -fit.least > smaller;
+            all_worse &= -fit.ratio > DELAY.log_ratio && -fit.least > smaller;
             if fit.ratio > lead {
                 lead = fit.ratio;
                 // It must beat the rest as clearly.
                 let mut rest = others.iter().enumerate().filter(|(index, _)| *index != at);
-                let beaten = rest.all(|(_, rest)| self.compare(rest, other).ratio > CERTAIN);
-                let clear = fit.ratio > CERTAIN && fit.most > smaller && beaten;
+                let beaten =
+                    rest.all(|(_, rest)| self.compare(rest, other).ratio > DELAY.log_ratio);
+                let clear = fit.ratio > DELAY.log_ratio && fit.most > smaller && beaten;
                 found = clear.then_some(delay);
             }
         }
         self.found = found;
-        self.over = self.found.is_some() || all_worse || self.samples >= MOST;
+        self.over = self.found.is_some() || all_worse || self.samples >= DELAY.most_samples;
     }
 
     /// How much better than `reference` a run fits the readings.
@@ -195,7 +181,7 @@ impl DelayWatch {
             least: 0.0,
         };
         for ((reference, run), reading) in pairs.zip(&self.readings) {
-            let nothing = NOTHING * reading + f64::MIN_POSITIVE;
+            let nothing = DELAY.zero * reading + f64::MIN_POSITIVE;
             let of_output = libm::log((reference + nothing) / (run + nothing));
             fit.ratio += half * of_output;
             fit.most = fit.most.max(of_output);

@@ -335,6 +335,9 @@ pub struct Estimator {
 /// Leverage beyond which a residual is not used, where nothing else is asked for.
 pub const LEVERAGE_LIMIT: f64 = 100.0;
 
+/// Most harmonics of a known disturbance.
+pub const MOST_HARMONICS: usize = 50;
+
 impl Estimator {
     /// No estimation, for so many sensors. Before choosing a method, set what it needs: its predictors or
     /// hypotheses and the thresholds, which no residual exceeds here.

@@ -14,7 +14,8 @@ use crate::{
 };
 use ftc_control::Matrix;
 use ftc_control::parameters::{
-    Estimator, EstimatorMethod, FeedbackGains, LEVERAGE_LIMIT, ObserverKind, Predictor,
+    Estimator, EstimatorMethod, FeedbackGains, LEVERAGE_LIMIT, MOST_HARMONICS, ObserverKind,
+    Predictor,
 };
 use ftc_plant::scaling::Scaling;
 use nalgebra::DMatrix;
@@ -23,8 +24,9 @@ use nalgebra::DMatrix;
 /// rounding on another machine, and no more.
 const TOLERANCE: f64 = 1e-9;
 
-/// The largest magnitude of an operating point or a threshold: that of a number in a design file.
-const LARGEST: f64 = 1e15;
+/// The largest magnitude of an operating point, a threshold or any number in a design file: no physical quantity in
+/// reasonable units is larger, and beyond it products overflow.
+pub const LARGEST: f64 = 1e15;
 
 /// Numbers of a design that `verify` holds against bounds only, in words for its report.
 pub const UNCOVERED: [&str; 7] = [
@@ -347,7 +349,7 @@ fn plausible(predictor: &Predictor, units: &Scaling) -> bool {
 /// What a response learned in one mode tells of another follows from the plant.
 fn transfers_fit(design: &Design, estimator: &Estimator, outputs: &[f64]) -> bool {
     let derived = match &estimator.harmonics {
-        Some(known) if known.period > 0.0 && known.count > 0 && known.count < 100 => {
+        Some(known) if known.period > 0.0 && (1..=MOST_HARMONICS).contains(&known.count) => {
             harmonics::transfers(&design.plant, outputs, known.period, known.count)
         }
         Some(_) => return false,

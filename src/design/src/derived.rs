@@ -6,13 +6,11 @@ use crate::feedforward;
 use crate::matrices::{dense, plain};
 use crate::running_loop::{TRANSFER_DECAY, TransferCertificate};
 use ftc_control::parameters::{Limits, StateFeedback, Transfer};
+use ftc_control::tuning::TUNING;
 use ftc_plant::SwitchedPlant;
 
 /// Noise that the state-based estimator assumes at least, relative to the threshold.
 const SMALLEST_NOISE: f64 = 0.05;
-
-/// How many noise deviations a threshold usually is.
-const USUAL_SIGMAS: f64 = 6.0;
 
 /// Share of what saturation took off that unwinds the integrator in one sample.
 const UNWINDING: f64 = 0.5;
@@ -58,7 +56,7 @@ pub(crate) fn sensor_noise(given: &[f64], thresholds: &[f64]) -> Vec<f64> {
     sensors
         .map(|(&noise, &threshold)| match noise > 0.0 {
             true => noise.max(SMALLEST_NOISE * threshold),
-            false => threshold / USUAL_SIGMAS,
+            false => threshold / TUNING.threshold_deviations,
         })
         .collect()
 }

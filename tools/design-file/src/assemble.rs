@@ -28,8 +28,6 @@ use std::path::Path;
 pub(crate) const LARGEST_SIZE: usize = 64;
 /// The most samples of a scenario.
 pub(crate) const MOST_STEPS: usize = 1_000_000;
-/// The most harmonics of a disturbance.
-const MOST_HARMONICS: usize = 50;
 
 /// Checks a design file and turns it into a request; other files are sought in `folder`, and `notes`
 /// gets what the user should know of them.
@@ -395,7 +393,7 @@ fn disturbance(file: &DesignFile, dims: Dimensions) -> Result<Option<KnownDistur
             let count = i64::try_from(count).unwrap_or(i64::MAX);
             at(
                 "disturbance.harmonics",
-                check::count(count, 1, MOST_HARMONICS),
+                check::count(count, 1, parameters::MOST_HARMONICS),
             )?
         }
     };

@@ -1,9 +1,7 @@
 //! What a value must satisfy, whatever key it stands under.
 
 use crate::sentence::shorten;
-
-/// No physical quantity in reasonable units is larger; beyond it products overflow.
-const LARGEST: f64 = 1e15;
+use ftc_design::coverage::LARGEST;
 
 /// No positive one is smaller; beyond it quotients overflow.
 const SMALLEST: f64 = 1.0 / LARGEST;

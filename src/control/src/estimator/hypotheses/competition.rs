@@ -3,27 +3,11 @@
 use super::hypothesis::{Hypothesis, Kinds, Reading, Sensors, has};
 use super::model::{Layout, ModeModel};
 use super::own_run::OwnRun;
-use super::{Bank, BankState, KEEP, Live, RENEWED};
+use super::{Bank, BankState, Live};
+use crate::tuning::BANK;
 use alloc::vec;
 use alloc::vec::Vec;
 use serde::{Deserialize, Serialize};
-
-/// How far the explanation by the model and healthy sensors may fall: it is always kept.
-const MEMORY: f64 = 30.0;
-/// Hypotheses about the same sensors.
-const ALIKE: usize = 2;
-/// Squared whitened innovation below which nothing but "all goes on" is considered.
-pub(super) const QUIET: f64 = 8.0;
-/// Price of several sensors at once, relative to that of one.
-pub(super) const TOGETHER: f64 = 1.5;
-/// Price of all loads at once, and of a plant that is no longer the model, relative to that of one load.
-pub(super) const UNLIKE: f64 = 2.0;
-/// Price of a fault before the first sample: one sensor in a hundred.
-pub(super) const AT_START: f64 = -4.6;
-/// Mean of the relative error of a sensor's wrong gain.
-pub(super) const SCALE_MEAN: f64 = -0.5;
-/// Its variance.
-pub(super) const SCALE_VARIANCE: f64 = 0.25;
 
 /// What may have happened since the last sample.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -229,7 +213,7 @@ impl Bank {
             let candidate = state.candidates.list[index];
             let kind = self.kind(state, &candidate);
             let unflagged = (kind.0, kind.1) == (0, false);
-            let room = KEEP - usize::from(!plain);
+            let room = BANK.kept - usize::from(!plain);
             let stays = candidate.score >= best - margin && kept < room;
             if !stays && (plain || !unflagged) {
                 continue;
@@ -238,12 +222,13 @@ impl Bank {
                 .iter()
                 .filter(|c| self.kind(state, c) == kind && c.convinced == candidate.convinced)
                 .count();
-            if alike >= ALIKE || self.is_twin(state, &candidate, kept) {
+            if alike >= BANK.per_sensor_set || self.is_twin(state, &candidate, kept) {
                 continue;
             }
             plain |= unflagged;
             let mut taken = candidate;
-            taken.score = (candidate.score - best).clamp(-MEMORY, MEMORY);
+            taken.score =
+                (candidate.score - best).clamp(-BANK.unflagged_range, BANK.unflagged_range);
             state.candidates.list[kept] = taken;
             kept += 1;
         }
@@ -316,7 +301,7 @@ impl Bank {
             | Action::Drift(_) => -2.0 * self.prices.fault,
             Action::Change(_) => -2.0 * self.prices.change,
         };
-        h.misfit += RENEWED * (state.seen[slot].square.min(1e3) + price - h.misfit);
+        h.misfit += BANK.misfit_share * (state.seen[slot].square.min(1e3) + price - h.misfit);
         h.convinced = candidate.convinced;
     }
 

@@ -1,13 +1,11 @@
 //! What happened, done to the hypothesis to which it did.
 
-use super::competition::{Action, Candidate, SCALE_MEAN, SCALE_VARIANCE};
+use super::competition::{Action, Candidate};
 use super::hypothesis::{Hypothesis, Reading, has};
 use super::model::ModeModel;
 use super::own_run::OwnRun;
 use super::{Bank, BankState};
-
-/// Variance of loads and input gains that are said to be gone, relative to that of their jumps.
-const REMAINS: f64 = 0.01;
+use crate::tuning::BANK;
 
 impl Bank {
     /// The hypothesis in `slot` becomes what the candidate makes of its parent.
@@ -50,7 +48,9 @@ impl Bank {
                 let variance = reading.noise[q] * reading.noise[q] / state.count[q].max(1.0);
                 child.open(fault + q, state.mean[q], variance);
             }
-            Action::Scale(q) => child.open(fault + q, SCALE_MEAN, SCALE_VARIANCE),
+            Action::Scale(q) => {
+                child.open(fault + q, BANK.gain_fault_mean, BANK.gain_fault_variance)
+            }
             Action::Start => {
                 for (k, sd) in settings.start_elsewhere.iter().enumerate() {
                     child.cov[k * stride + k] += sd * sd;
@@ -91,11 +91,11 @@ impl Bank {
     fn reset_loads(&self, h: &mut Hypothesis, model: &ModeModel, run: &OwnRun) {
         for (k, size) in model.load_size.iter().enumerate() {
             let k = self.layout.load() + k;
-            h.open(k, run.load(k), REMAINS * size * size);
+            h.open(k, run.load(k), BANK.load_remainder * size * size);
         }
         let gain = self.settings.gain_error;
         for k in self.layout.gain()..self.layout.fault() {
-            h.open(k, run.load(k), REMAINS * gain * gain);
+            h.open(k, run.load(k), BANK.load_remainder * gain * gain);
         }
     }
 

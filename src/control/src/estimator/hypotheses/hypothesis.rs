@@ -9,13 +9,10 @@ use super::linear::{
 use super::model::{Jump, Layout, ModeModel};
 use crate::kernel::bounded;
 use crate::parameters::Hypotheses as Settings;
+use crate::tuning::BANK;
 use alloc::vec;
 use alloc::vec::Vec;
 use serde::{Deserialize, Serialize};
-
-/// Square of the difference of two innovations, or estimates, relative to the variance, up to which they
-/// are the same.
-const SAME: f64 = 0.1;
 
 /// A set of sensors, as bits.
 pub type Sensors = u64;
@@ -216,7 +213,7 @@ impl Innovation {
         self.r.iter().zip(r).enumerate().all(|(q, (own, other))| {
             let factor = &self.s[q * p..=q * p + q];
             let off = own - other;
-            off * off <= SAME * dot(factor, factor)
+            off * off <= BANK.same_estimate * dot(factor, factor)
         })
     }
 
@@ -328,7 +325,7 @@ impl Hypothesis {
         let mut variances = self.cov.iter().step_by(stride + 1);
         pairs.zip(&mut variances).all(|((own, other), variance)| {
             let off = own - other;
-            off * off <= SAME * variance
+            off * off <= BANK.same_estimate * variance
         })
     }
 

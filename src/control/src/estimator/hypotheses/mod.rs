@@ -22,13 +22,14 @@ mod propose;
 mod start;
 mod trial;
 
+use crate::tuning::BANK;
 use alloc::vec::Vec;
 pub use hypothesis::{Hypothesis, Reading, Sensors, has};
 pub use model::Layout;
 
 use super::super::parameters::Hypotheses;
 use crate::compensation::is_measurement;
-use competition::{Candidates, QUIET};
+use competition::Candidates;
 use hypothesis::{Innovation, Step};
 use linear::dot;
 use model::ModeModel;
@@ -36,31 +37,10 @@ use own_run::OwnRun;
 use serde::{Deserialize, Serialize};
 use trial::Outlook;
 
-/// Most hypotheses that stay after a sample.
-const KEEP: usize = 12;
 /// Most modes where the mode is not told: each but the leading one needs a hypothesis.
 pub const MOST_MODES: usize = 9;
 /// Most hypotheses that may exist while a sample is judged.
-const SLOTS: usize = 2 * KEEP + MOST_MODES - 1;
-/// Evidence of a frozen sensor from which it is considered, in log likelihood.
-const FREEZING: f64 = 4.0;
-/// What the very same reading says for a frozen sensor while the model's own run moves, in log likelihood.
-const REPEATS: f64 = 5.0;
-/// Deviations (squared) of the model's own run from which loads are said to have moved an output.
-const DISPLACED: f64 = 36.0;
-/// The same, from which it is considered that they are gone.
-const APART: f64 = 4.0;
-/// Memory of the running misfit: its share that a sample renews.
-const RENEWED: f64 = 0.1;
-/// Variance of a sensor's noise at the start, relative to the design's, and how many samples say so.
-const NOISE_AT_START: f64 = 4.0;
-const NOISE_PRIOR: f64 = 25.0;
-/// Samples over which the noise is estimated afterwards.
-const NOISE_MEMORY: f64 = 300.0;
-/// Largest variance of the noise relative to the design's.
-const MOST_NOISE: f64 = 100.0;
-/// Squared innovation, relative to its variance, beyond which it says nothing more about the noise.
-const OUTLIER: f64 = 9.0;
+const SLOTS: usize = 2 * BANK.kept + MOST_MODES - 1;
 
 /// The estimator: immutable, shared by any number of [`BankState`]s.
 #[derive(Clone, Debug)]
@@ -295,9 +275,9 @@ impl Bank {
         let h = &state.slots[head];
         let calm = h.flagged() == 0
             && !h.loose
-            && state.seen[head].square < QUIET + 2.0 * p as f64
+            && state.seen[head].square < BANK.quiet + 2.0 * p as f64
             && state.seen[head].sound
-            && state.evidence.iter().all(|&e| e < FREEZING)
+            && state.evidence.iter().all(|&e| e < BANK.frozen_evidence)
             && !state.first
             && state.apart == 0
             && !(self.settings.trusts_model() && state.suspect != 0)
@@ -312,8 +292,8 @@ impl Bank {
         self.correct_own_run(state, reading);
         self.learn_noise(state, reading);
         self.conclude(state, reading);
-        let displaced = state.own.displaced(&state.expected, DISPLACED);
-        state.apart = state.own.displaced(&state.expected, APART);
+        let displaced = state.own.displaced(&state.expected, BANK.displaced);
+        state.apart = state.own.displaced(&state.expected, BANK.returned);
         state.own.learn(&state.expected);
         state.usual.learn(&state.expected);
         let best = &state.slots[state.best];
@@ -331,7 +311,7 @@ impl Bank {
         if !seen.sound {
             return;
         }
-        state.noise_samples = (state.noise_samples + 1.0).min(NOISE_MEMORY);
+        state.noise_samples = (state.noise_samples + 1.0).min(BANK.noise_memory);
         for q in 0..p {
             if !has(reading.valid & !flagged, q) {
                 continue;
@@ -340,12 +320,12 @@ impl Bank {
             let variance = dot(factor, factor);
             let noise = reading.noise[q] * reading.noise[q];
             let share = noise / variance;
-            let square = (seen.r[q] * seen.r[q]).min(OUTLIER * variance);
+            let square = (seen.r[q] * seen.r[q]).min(BANK.outlier * variance);
             let relative = share * (square / variance) + (1.0 - share);
             if relative.is_finite() {
                 let ratio = &mut state.noise_ratio[q];
                 *ratio += *ratio * (relative - 1.0) / state.noise_samples;
-                *ratio = ratio.clamp(1.0, MOST_NOISE);
+                *ratio = ratio.clamp(1.0, BANK.noise_limit);
             }
         }
     }
@@ -379,8 +359,12 @@ impl Bank {
             let gain = 0.5 * (seen.r[q] * seen.r[q] / s).min(50.0)
                 - 0.5 * off * off / (variance * (1.0 + 1.0 / state.count[q]))
                 - 0.02;
-            let repeats = moved * moved > DISPLACED * variance;
-            state.evidence[q] += if repeats { gain.max(REPEATS) } else { gain };
+            let repeats = moved * moved > BANK.displaced * variance;
+            state.evidence[q] += if repeats {
+                gain.max(BANK.repeat_evidence)
+            } else {
+                gain
+            };
             if state.evidence[q] <= 0.0 {
                 state.evidence[q] = 0.0;
                 state.mean[q] = y;
@@ -424,7 +408,7 @@ impl Bank {
                 state.seen[state.best].r[q]
             };
         }
-        state.misfit += RENEWED * (state.seen[state.best].square.min(1e3) - state.misfit);
+        state.misfit += BANK.misfit_share * (state.seen[state.best].square.min(1e3) - state.misfit);
         state.model_valid = state.misfit < 4.0 * p as f64 && !h.loose;
         self.find_load(state, model);
         state.actuator_fault = 0;

@@ -8,10 +8,8 @@
 use super::hypothesis::{Hypothesis, Innovation};
 use super::linear::dot;
 use super::model::{Layout, ModeModel};
-use super::{Bank, BankState, Live, RENEWED};
-
-/// How much worse than a switch now, in log likelihood, a switch earlier may explain the readings.
-const RESTART: f64 = 3.0;
+use super::{Bank, BankState, Live};
+use crate::tuning::BANK;
 
 /// Whether two modes differ in what they make of one state, so that a switch shows in the sample of it.
 pub(super) fn differ_at_once(one: &ModeModel, other: &ModeModel) -> bool {
@@ -100,7 +98,7 @@ impl Bank {
             let (h, seen) = (&mut state.slots[slot], &mut state.seen[slot]);
             h.score += likelihood(seen) - lead;
             h.update(self.layout, seen, self.output_error());
-            h.misfit += RENEWED * (seen.square.min(1e3) - h.misfit);
+            h.misfit += BANK.misfit_share * (seen.square.min(1e3) - h.misfit);
         }
         state.slots[head].score = 0.0;
         state.best = head;
@@ -129,7 +127,7 @@ impl Bank {
                 .filter(|&slot| stands_for(&state.slots[slot], lead, mode as u32))
                 .max_by(|&a, &b| state.slots[a].score.total_cmp(&state.slots[b].score));
             let slot = match standing {
-                Some(slot) if state.slots[slot].score >= score - RESTART => continue,
+                Some(slot) if state.slots[slot].score >= score - BANK.switch_restart => continue,
                 Some(slot) => slot,
                 None => match free(state.live, state.slots.len()) {
                     Some(slot) => slot,

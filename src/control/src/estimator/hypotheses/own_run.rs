@@ -5,18 +5,10 @@ use super::linear::sparse_dot;
 use super::model::{Layout, ModeModel};
 use crate::kernel::bounded;
 use crate::parameters::Hypotheses as Settings;
+use crate::tuning::BANK;
 use alloc::vec;
 use alloc::vec::Vec;
 use serde::{Deserialize, Serialize};
-
-/// Samples over which the error of the run is estimated.
-const MEMORY: f64 = 300.0;
-/// Least and largest variance of that error, relative to what the model's error allows.
-const SHARE: [f64; 2] = [0.02, 1.0];
-/// Samples over which a load becomes usual.
-const USUAL: f64 = 1000.0;
-/// The state at the start may be off by so many of its standard deviations.
-const START: f64 = 3.0;
 
 /// The model's own run.
 #[derive(Debug, PartialEq, Serialize, Deserialize)]
@@ -126,7 +118,7 @@ impl OwnRun {
     /// Variance of state `k` that the model's error allows.
     pub fn variance(&self, model: &ModeModel, settings: &Settings, k: usize) -> f64 {
         let off = settings.model_error * (self.x[k] - model.x0[k]);
-        let start = START * settings.start[k];
+        let start = BANK.start_deviations * settings.start[k];
         off * off + start * start
     }
 
@@ -139,7 +131,7 @@ impl OwnRun {
     pub fn learn_loads(&mut self, layout: Layout, z: &[f64]) {
         let loads = layout.load()..layout.fault();
         for (usual, now) in self.before[loads.clone()].iter_mut().zip(&z[loads]) {
-            *usual += (now - *usual) / USUAL;
+            *usual += (now - *usual) / BANK.usual_load;
         }
     }
 
@@ -152,9 +144,9 @@ impl OwnRun {
     pub fn learn(&mut self, outputs: &[f64]) {
         for (q, output) in outputs.iter().enumerate() {
             let off = output - self.y[q];
-            self.error[q] += (bounded(off * off) - self.error[q]) / MEMORY;
+            self.error[q] += (bounded(off * off) - self.error[q]) / BANK.run_memory;
             let bound = self.bound[q * outputs.len() + q];
-            self.allowed[q] += (bounded(bound) - self.allowed[q]) / MEMORY;
+            self.allowed[q] += (bounded(bound) - self.allowed[q]) / BANK.run_memory;
         }
     }
 
@@ -167,7 +159,7 @@ impl OwnRun {
 
     /// Variance of output `q` relative to what the model's error allows.
     fn share(&self, q: usize) -> f64 {
-        let [least, most] = SHARE;
+        let [least, most] = BANK.run_share;
         let share = self.error[q] / self.allowed[q].max(f64::MIN_POSITIVE);
         if share.is_finite() {
             share.clamp(least, most)

@@ -1,14 +1,11 @@
 //! What may have happened to a hypothesis since the last sample.
 
-use super::competition::{AT_START, Action, Candidate, QUIET, TOGETHER, UNLIKE};
+use super::competition::{Action, Candidate};
 use super::hypothesis::{Hypothesis, Reading, Sensors, has};
 use super::model::ModeModel;
 use super::own_run::OwnRun;
-use super::{APART, Bank, BankState, DISPLACED, FREEZING};
-
-/// What it costs per sample, in log likelihood, that a fault has come to nothing and yet is there: after two
-/// hundred or so it has no influence any more.
-const FADING: f64 = 0.05;
+use super::{Bank, BankState};
+use crate::tuning::BANK;
 
 /// The hypothesis to which something may have happened.
 #[derive(Clone, Copy)]
@@ -57,11 +54,11 @@ impl Bank {
             stuck: h.stuck,
             loose: h.loose,
             convinced: h.convinced,
-            unlikely: seen.square > QUIET.min(4.0 + p as f64),
+            unlikely: seen.square > BANK.quiet.min(4.0 + p as f64),
         };
         state.outlook.stale = true;
         if slot != state.best && self.has_come_to_nothing(h, reading) {
-            parent.stay -= FADING;
+            parent.stay -= BANK.fading;
         }
         state
             .candidates
@@ -79,7 +76,7 @@ impl Bank {
         biases
             && faults.all(|q| {
                 let (k, noise) = (fault + q, reading.noise[q]);
-                let most = h.cov[k * (stride + 1)].min(DISPLACED * noise * noise);
+                let most = h.cov[k * (stride + 1)].min(BANK.displaced * noise * noise);
                 h.z[k] * h.z[k] <= most
             })
     }
@@ -141,8 +138,8 @@ impl Bank {
         if parent.unlikely {
             for jump in 0..model.jumps.len() {
                 let together = match jump {
-                    0 => UNLIKE,
-                    _ if jump + 1 == model.jumps.len() => TOGETHER,
+                    0 => BANK.several_loads,
+                    _ if jump + 1 == model.jumps.len() => BANK.several_sensors,
                     _ => 1.0,
                 };
                 consider(state, Action::Load(jump), together * prices.load);
@@ -165,7 +162,7 @@ impl Bank {
         for back in [Action::Home, Action::Return] {
             let run = back.run(&state.own, &state.usual);
             let output = &state.seen[parent.slot].output;
-            if parent.unlikely && run.displaced(output, APART) != 0 {
+            if parent.unlikely && run.displaced(output, BANK.returned) != 0 {
                 // What stands against the loads that would then be gone makes up for the price of a fault.
                 let z = &state.slots[parent.slot].z;
                 let against = self.implausible(model, z, run);
@@ -188,7 +185,11 @@ impl Bank {
         reading: Reading<'_>,
     ) {
         let trusted = self.settings.trusts_model();
-        let limit = if trusted { DISPLACED } else { APART };
+        let limit = if trusted {
+            BANK.displaced
+        } else {
+            BANK.returned
+        };
         let set = state.own.displaced(&state.seen[parent.slot].output, limit) & reading.valid;
         let known =
             |other: usize| state.slots[other].additive == set && !state.slots[other].convinced;
@@ -196,7 +197,7 @@ impl Bank {
             return;
         }
         let value = self.trial(state, parent.slot, model, reading, Action::Drift(set));
-        if state.trial.square < QUIET + 2.0 * self.layout.p as f64 {
+        if state.trial.square < BANK.quiet + 2.0 * self.layout.p as f64 {
             let score = match trusted {
                 true => parent.stay.max(parent.score + value) + 1.0,
                 false => parent.stay,
@@ -220,7 +221,7 @@ impl Bank {
         let p = self.layout.p;
         let free = sensors(p) & !parent.flagged & reading.valid;
         let price = if state.first {
-            AT_START
+            BANK.start_fault
         } else {
             self.prices.fault
         };
@@ -233,12 +234,15 @@ impl Bank {
             consider(Action::Scale(q), price);
             if p > 2 && p <= 4 {
                 for other in (0..q).filter(|&other| has(free, other)) {
-                    consider(Action::Bias(1 << q | 1 << other), TOGETHER * price);
+                    consider(
+                        Action::Bias(1 << q | 1 << other),
+                        BANK.several_sensors * price,
+                    );
                 }
             }
         }
         if free.count_ones() > 1 {
-            consider(Action::Bias(free), TOGETHER * price);
+            consider(Action::Bias(free), BANK.several_sensors * price);
         }
     }
 
@@ -255,7 +259,7 @@ impl Bank {
         let known = parent.flagged & reading.valid;
         for q in 0..p {
             let may_freeze = has(sensors(p) & !parent.stuck & reading.valid, q);
-            if may_freeze && leads && state.evidence[q] > FREEZING {
+            if may_freeze && leads && state.evidence[q] > BANK.frozen_evidence {
                 let price = prices.stuck + state.evidence_before[q];
                 let freeze = (Action::Freeze(q), price, parent.convinced);
                 self.consider(state, parent, model, reading, freeze);
@@ -278,7 +282,7 @@ impl Bank {
             );
         }
         if known.count_ones() > 1 {
-            let all = (parent.flagged, TOGETHER * prices.release, true);
+            let all = (parent.flagged, BANK.several_sensors * prices.release, true);
             self.propose_release(state, parent, model, reading, all);
         }
     }

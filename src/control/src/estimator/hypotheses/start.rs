@@ -1,20 +1,18 @@
 //! From the plant and the settings to an estimator ready to run.
 
-use super::competition::{Candidates, UNLIKE};
+use super::competition::Candidates;
 use super::hypothesis::{Hypothesis, Innovation};
 use super::linear::{axpy, factor, solve};
 use super::model::{Layout, ModeModel};
 use super::modes::differ_at_once;
 use super::own_run::OwnRun;
 use super::trial::Outlook;
-use super::{Bank, BankState, KEEP, Live, NOISE_AT_START, NOISE_PRIOR, Prices};
+use super::{Bank, BankState, Live, Prices};
 use crate::matrix::Matrix;
 use crate::parameters::{Hypotheses, ModeModel as Described};
+use crate::tuning::BANK;
 use alloc::vec;
 use alloc::vec::Vec;
-
-/// Standard deviation of loads and input gains at the start, relative to that of their jumps.
-const AT_REST: f64 = 0.3;
 
 fn rows(matrix: &Matrix) -> Vec<f64> {
     let (rows, columns) = matrix.shape();
@@ -207,7 +205,7 @@ impl Bank {
                 release: ln(settings.release_rate),
                 change: ln(settings.change_rate),
                 load: ln(settings.load_rate),
-                changed: UNLIKE * ln(settings.load_rate),
+                changed: BANK.several_loads * ln(settings.load_rate),
                 mode: settings.mode_rate.map(ln),
             },
             noise_per_threshold: settings
@@ -241,7 +239,7 @@ impl Bank {
             .collect();
         let mut live = Live::NONE;
         (0..slots.len()).for_each(|slot| live.add(slot));
-        slots.resize(2 * KEEP + self.others(), Hypothesis::new(layout));
+        slots.resize(2 * BANK.kept + self.others(), Hypothesis::new(layout));
         BankState {
             seen: vec![Innovation::new(layout); slots.len()],
             candidates: Candidates::new(slots.len(), p, model.jumps.len()),
@@ -257,8 +255,8 @@ impl Bank {
             moved: vec![0.0; m],
             first: true,
             noise: vec![0.0; p],
-            noise_ratio: vec![NOISE_AT_START; p],
-            noise_samples: NOISE_PRIOR,
+            noise_ratio: vec![BANK.noise_at_start; p],
+            noise_samples: BANK.noise_prior,
             evidence: vec![0.0; p],
             evidence_before: vec![0.0; p],
             repeated: vec![0.0; p],
@@ -295,13 +293,13 @@ impl Bank {
             set(i, settings.start[i]);
         }
         for (k, size) in model.load_size.iter().enumerate() {
-            set(layout.load() + k, AT_REST * size);
+            set(layout.load() + k, BANK.load_at_start * size);
         }
         for i in 0..d {
             set(n + i, settings.disturbance_size[i]);
         }
         for j in 0..m {
-            set(layout.gain() + j, AT_REST * settings.gain_error);
+            set(layout.gain() + j, BANK.load_at_start * settings.gain_error);
         }
         rest
     }

@@ -3,11 +3,12 @@
 // Matrices are flat and addressed by row and column, as in the equations.
 #![allow(clippy::needless_range_loop)]
 
-use super::competition::{Action, SCALE_MEAN, SCALE_VARIANCE};
+use super::competition::Action;
 use super::hypothesis::{Hypothesis, Innovation, Kinds, Reading, Sensors, has};
 use super::linear::{combine, padded, sparse_dot};
 use super::model::{Layout, ModeModel};
 use super::{Bank, BankState};
+use crate::tuning::BANK;
 use alloc::vec;
 use alloc::vec::Vec;
 use serde::{Deserialize, Serialize};
@@ -146,7 +147,7 @@ impl Bank {
                 Action::Freeze(frozen) if frozen == q => ([0.0; 2], mean[q]),
                 // The gain opens around its mean; nothing of the old entry counts.
                 Action::Scale(scaled) if scaled == q => {
-                    let factor = 1.0 + SCALE_MEAN;
+                    let factor = 1.0 + BANK.gain_fault_mean;
                     ([factor, 0.0], factor * outlook.output[q])
                 }
                 _ => outlook.weigh(q, kinds, bias),
@@ -194,7 +195,7 @@ impl Bank {
             }
             Action::Scale(q) => {
                 let output = state.outlook.output[q];
-                s[q * p + q] += output * output * SCALE_VARIANCE;
+                s[q * p + q] += output * output * BANK.gain_fault_variance;
             }
             Action::Freeze(q) => {
                 let noise = reading.noise[q];
