@@ -7,6 +7,7 @@ use ftc_plant::{Dimensions, Scenario, SwitchedPlant, TruePlant};
 use minicbor::Decoder;
 use minicbor::data::Type;
 use serde::Deserialize;
+use serde::de::IgnoredAny;
 
 /// Name of the design in an FMU's `resources` folder: CBOR (RFC 8949), the record as a map of its fields.
 pub const DESIGN_FILE: &str = "design.cbor";
@@ -50,69 +51,38 @@ pub fn write_design(design: &Design) -> Result<Vec<u8>, DesignFileError> {
 }
 
 /// [`Design`] without its proof, which is not there: to be able to read it, too, took a seventh of a binary.
+/// Of the experiment `S` and the true plant `T` is read what the reader needs.
 #[derive(Deserialize)]
-struct Running {
+struct Running<S, T> {
     format: u32,
     name: String,
     signals: Signals,
     plant: SwitchedPlant,
     controller: ControllerDesign,
     #[serde(default)]
-    true_plant: TruePlant,
-    scenario: Scenario,
+    true_plant: T,
+    scenario: S,
 }
 
-impl TryFrom<Running> for Design {
-    type Error = RecordError;
-
-    fn try_from(read: Running) -> Result<Self, RecordError> {
-        let mut design = Self::new(
-            &read.name,
-            read.plant,
-            read.signals,
-            read.controller,
-            read.scenario,
-        );
-        design.format = read.format;
-        design.true_plant = read.true_plant;
-        Ok(design)
-    }
-}
-
-/// What a controller needs of [`Running`]: of the experiment only how long it lasts and in which mode it begins.
-#[derive(Deserialize)]
-struct Controlling {
-    format: u32,
-    name: String,
-    signals: Signals,
-    plant: SwitchedPlant,
-    controller: ControllerDesign,
-    scenario: Course,
-}
-
-/// The course of a [`Scenario`].
+/// The course of a [`Scenario`]: all of it that a controller needs.
 #[derive(Deserialize)]
 struct Course {
     steps: u64,
     schedule: Vec<ModeInterval>,
 }
 
-impl TryFrom<Controlling> for Design {
-    type Error = RecordError;
-
-    fn try_from(read: Controlling) -> Result<Self, RecordError> {
-        let Course { steps, schedule } = read.scenario;
-        let reference = vec![Waveform::ZERO; read.controller.feedback.tracked.len()];
-        let mut scenario = Scenario::new(steps, reference, Dimensions::check(&read.plant)?);
-        scenario.schedule = schedule;
-        let mut design = Self::new(
-            &read.name,
-            read.plant,
-            read.signals,
-            read.controller,
-            scenario,
+impl Running<Scenario, TruePlant> {
+    fn checked(self) -> Result<Design, RecordError> {
+        let mut design = Design::new(
+            &self.name,
+            self.plant,
+            self.signals,
+            self.controller,
+            self.scenario,
         );
-        design.format = read.format;
+        design.format = self.format;
+        design.true_plant = self.true_plant;
+        design.check()?;
         Ok(design)
     }
 }
@@ -148,15 +118,9 @@ fn check_nesting(bytes: &[u8]) -> Result<(), DesignFileError> {
     Ok(())
 }
 
-fn read<'a, R>(bytes: &'a [u8]) -> Result<Design, DesignFileError>
-where
-    R: Deserialize<'a> + TryInto<Design, Error = RecordError>,
-{
+fn decode<'a, R: Deserialize<'a>>(bytes: &'a [u8]) -> Result<R, DesignFileError> {
     check_nesting(bytes)?;
-    let record: R = minicbor_serde::from_slice(bytes)?;
-    let design = record.try_into()?;
-    design.check()?;
-    Ok(design)
+    Ok(minicbor_serde::from_slice(bytes)?)
 }
 
 /// Reads the bytes of [`DESIGN_FILE`] and checks that all sizes agree.
@@ -164,7 +128,7 @@ where
 /// # Errors
 /// Bytes that hold no design, or one whose sizes do not agree.
 pub fn read_design(bytes: &[u8]) -> Result<Design, DesignFileError> {
-    read::<Running>(bytes)
+    Ok(decode::<Running<Scenario, TruePlant>>(bytes)?.checked()?)
 }
 
 /// The same without what only the simulated plant needs: it is as designed, and nothing happens to it but
@@ -173,7 +137,21 @@ pub fn read_design(bytes: &[u8]) -> Result<Design, DesignFileError> {
 /// # Errors
 /// As [`read_design`].
 pub fn read_controller(bytes: &[u8]) -> Result<Design, DesignFileError> {
-    read::<Controlling>(bytes)
+    let read: Running<Course, IgnoredAny> = decode(bytes)?;
+    let dims = Dimensions::check(&read.plant).map_err(RecordError::from)?;
+    let reference = vec![Waveform::ZERO; read.controller.feedback.tracked.len()];
+    let mut scenario = Scenario::new(read.scenario.steps, reference, dims);
+    scenario.schedule = read.scenario.schedule;
+    let whole = Running {
+        format: read.format,
+        name: read.name,
+        signals: read.signals,
+        plant: read.plant,
+        controller: read.controller,
+        true_plant: TruePlant::default(),
+        scenario,
+    };
+    Ok(whole.checked()?)
 }
 
 /// The disturbances as described, or else by their number alone.

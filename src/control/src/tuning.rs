@@ -78,10 +78,11 @@ pub struct BankTuning {
     pub unflagged_range: f64,
     /// Squared whitened innovation (1), beside two for each output, below which nothing is proposed.
     pub quiet: f64,
-    /// Log probability of several sensors failing at once over that of one (1): failures are seldom independent.
-    pub several_sensors: f64,
-    /// The same of all loads at once, and of a plant that is no longer the model, over that of one load (1).
-    pub several_loads: f64,
+    /// Log probability of several sensors failing at once over that of one, and of loads on all states over that of one
+    /// load (1): less than for independent ones, which would be two.
+    pub several: f64,
+    /// The same of all loads and gains at once, and of a plant that is no longer the model (1).
+    pub everything: f64,
     /// Log probability (nat) of a fault before the first sample: one sensor in a hundred.
     pub start_fault: f64,
     /// Mean of the relative error of a sensor's gain when it begins (1): half of the signal is lost.
@@ -135,8 +136,8 @@ pub const BANK: BankTuning = BankTuning {
     per_sensor_set: 2,
     unflagged_range: 30.0,
     quiet: 8.0,
-    several_sensors: 1.5,
-    several_loads: 2.0,
+    several: 1.5,
+    everything: 2.0,
     start_fault: -4.6,
     gain_fault_mean: -0.5,
     gain_fault_variance: 0.25,

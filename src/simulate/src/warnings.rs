@@ -19,6 +19,8 @@ const SHARE_SATURATED: f64 = 0.05;
 const SHARE_CAPPED: f64 = 0.01;
 /// A fault is large where it exceeds so many thresholds of its sensor.
 const LARGE_FAULT: f64 = 3.0;
+/// Share of the samples that may have a large fault before it is looked at.
+const SHARE_FAULTY: f64 = 0.01;
 /// Share of the samples with a large fault in which it may go unnoticed without a warning.
 const SHARE_UNNOTICED: f64 = 0.5;
 /// Standard deviation of a command's noise, relative to its range, without a warning.
@@ -232,13 +234,14 @@ fn unnoticed(run: &RunWatch<'_>) -> Vec<RunWarning> {
     }
     let sensors = run.large.iter().enumerate();
     sensors
-        .filter(|(_, large)| run.share(large.samples) > SHARE_CAPPED)
-        .map(|(sensor, large)| RunWarning::Unnoticed {
+        .filter(|(_, large)| run.share(large.samples) > SHARE_FAULTY)
+        .map(|(sensor, large)| (sensor, large, large.missed as f64 / large.samples as f64))
+        .filter(|&(_, _, share)| share > SHARE_UNNOTICED)
+        .map(|(sensor, large, share)| RunWarning::Unnoticed {
             sensor,
-            share: large.missed as f64 / large.samples as f64,
+            share,
             largest: large.largest,
         })
-        .filter(|warning| matches!(warning, RunWarning::Unnoticed { share, .. } if *share > SHARE_UNNOTICED))
         .collect()
 }
 

@@ -95,29 +95,29 @@ mod tests {
     use proptest::prelude::*;
 
     proptest! {
-            /// The same, to the bit, as by times; also where these are out of order.
-            #[test]
-            fn ticks_play_what_times_say(
-                times in prop::collection::vec(-1.0..9.0f64, 0..5), values in prop::array::uniform5(-2.0..2.0f64),
-                sample_time in prop::sample::select(vec![0.1, 1.0, 1.0 / 60.0]),
-            ) {
-                let points: Vec<_> = times.iter().zip(values).map(|(&time, value)| [time, value]).collect();
-                let waveforms = [
-                    Waveform::Steps { points },
-                    Waveform::Constant { value: values[0] },
-                    Waveform::Sine { amplitude: 1.0, period: 2.0, phase: 0.3, offset: 0.1 },
-                ];
-                let intervals = times.iter().enumerate().map(|(mode, &from)| ModeInterval { from, mode });
-                let dims = ftc_plant::Dimensions { states: 1, inputs: 1, outputs: 1, disturbances: 1 };
-                let mut scenario = Scenario::new(9, waveforms.to_vec(), dims);
-    scenario.schedule = intervals.collect();
-                let schedule = Schedule::new(&scenario, sample_time);
-                for tick in (0..100).chain([u64::MAX]) {
-                    prop_assert_eq!(schedule.mode(tick), scenario.mode(tick, sample_time));
-                    for (signal, waveform) in schedule.reference.iter().zip(&waveforms) {
-                        prop_assert_eq!(signal.at(tick, sample_time), waveform.at(tick, sample_time));
-                    }
+        /// The same, to the bit, as by times; also where these are out of order.
+        #[test]
+        fn ticks_play_what_times_say(
+            times in prop::collection::vec(-1.0..9.0f64, 0..5), values in prop::array::uniform5(-2.0..2.0f64),
+            sample_time in prop::sample::select(vec![0.1, 1.0, 1.0 / 60.0]),
+        ) {
+            let points: Vec<_> = times.iter().zip(values).map(|(&time, value)| [time, value]).collect();
+            let waveforms = [
+                Waveform::Steps { points },
+                Waveform::Constant { value: values[0] },
+                Waveform::Sine { amplitude: 1.0, period: 2.0, phase: 0.3, offset: 0.1 },
+            ];
+            let intervals = times.iter().enumerate().map(|(mode, &from)| ModeInterval { from, mode });
+            let dims = ftc_plant::Dimensions { states: 1, inputs: 1, outputs: 1, disturbances: 1 };
+            let mut scenario = Scenario::new(9, waveforms.to_vec(), dims);
+            scenario.schedule = intervals.collect();
+            let schedule = Schedule::new(&scenario, sample_time);
+            for tick in (0..100).chain([u64::MAX]) {
+                prop_assert_eq!(schedule.mode(tick), scenario.mode(tick, sample_time));
+                for (signal, waveform) in schedule.reference.iter().zip(&waveforms) {
+                    prop_assert_eq!(signal.at(tick, sample_time), waveform.at(tick, sample_time));
                 }
             }
         }
+    }
 }

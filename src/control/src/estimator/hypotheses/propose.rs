@@ -138,8 +138,8 @@ impl Bank {
         if parent.unlikely {
             for jump in 0..model.jumps.len() {
                 let together = match jump {
-                    0 => BANK.several_loads,
-                    _ if jump + 1 == model.jumps.len() => BANK.several_sensors,
+                    0 => BANK.everything,
+                    _ if jump + 1 == model.jumps.len() => BANK.several,
                     _ => 1.0,
                 };
                 consider(state, Action::Load(jump), together * prices.load);
@@ -234,15 +234,12 @@ impl Bank {
             consider(Action::Scale(q), price);
             if p > 2 && p <= 4 {
                 for other in (0..q).filter(|&other| has(free, other)) {
-                    consider(
-                        Action::Bias(1 << q | 1 << other),
-                        BANK.several_sensors * price,
-                    );
+                    consider(Action::Bias(1 << q | 1 << other), BANK.several * price);
                 }
             }
         }
         if free.count_ones() > 1 {
-            consider(Action::Bias(free), BANK.several_sensors * price);
+            consider(Action::Bias(free), BANK.several * price);
         }
     }
 
@@ -282,7 +279,7 @@ impl Bank {
             );
         }
         if known.count_ones() > 1 {
-            let all = (parent.flagged, BANK.several_sensors * prices.release, true);
+            let all = (parent.flagged, BANK.several * prices.release, true);
             self.propose_release(state, parent, model, reading, all);
         }
     }

@@ -205,7 +205,7 @@ impl Bank {
                 release: ln(settings.release_rate),
                 change: ln(settings.change_rate),
                 load: ln(settings.load_rate),
-                changed: BANK.several_loads * ln(settings.load_rate),
+                changed: BANK.everything * ln(settings.load_rate),
                 mode: settings.mode_rate.map(ln),
             },
             noise_per_threshold: settings
