@@ -220,7 +220,10 @@ impl Estimator {
     /// The field that is too large.
     pub fn check_memory(&self, inputs: usize) -> Result<(), ControllerError> {
         let window = self.window.saturating_mul(inputs);
-        let harmonics = self.harmonics.as_ref().map_or(0, |known| known.count);
+        let learned = self.harmonics.as_ref().map_or(0, |known| known.count);
+        let hypotheses = self.hypotheses.as_ref();
+        let period = hypotheses.and_then(|settings| settings.period);
+        let estimated = period.map_or(0, |known| known.harmonics);
         for (field, found, most, rule) in [
             (
                 "estimator.response_length",
@@ -242,7 +245,13 @@ impl Estimator {
             ),
             (
                 "estimator.harmonics.count",
-                harmonics,
+                learned,
+                MOST_HARMONICS,
+                "must be at most 50",
+            ),
+            (
+                "estimator.hypotheses.period.harmonics",
+                estimated,
                 MOST_HARMONICS,
                 "must be at most 50",
             ),
@@ -309,11 +318,6 @@ fn hypotheses(settings: &Hypotheses, sizes: Sizes) -> Checked {
     let (n, m, p) = (sizes.states, sizes.inputs, sizes.outputs);
     let s = sizes.disturbances;
     let harmonics = settings.period.map_or(0, |known| known.harmonics);
-    range(
-        harmonics <= MOST_HARMONICS,
-        "estimator.hypotheses.period.harmonics",
-        "must be at most 50",
-    )?;
     let period = settings.period.map_or(1.0, |known| known.seconds);
     range(
         period.is_finite() && period > 0.0,
