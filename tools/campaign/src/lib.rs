@@ -8,6 +8,7 @@
 //! share are refused rather than counted twice.
 
 mod draw;
+pub mod files;
 mod histogram;
 pub mod page;
 mod partial;
@@ -198,6 +199,24 @@ pub fn run_watched<E>(
         first = last;
     }
     Ok(partial)
+}
+
+/// Does the runs of `range` that `whole` lacks, and returns both together.
+///
+/// # Errors
+/// What `keep` says.
+pub fn complete<E>(
+    mut whole: Partial,
+    (design, options): (&Design, &Options),
+    range: Range<u64>,
+    watch: &Watch,
+    mut keep: impl FnMut(&[Outcome]) -> Result<(), E>,
+) -> Result<Partial, E> {
+    for missing in whole.missing(range) {
+        let part = run_watched(design, options, missing, watch, &mut keep)?;
+        whole.join(part);
+    }
+    Ok(whole)
 }
 
 /// The runs of shard `index` (from 1) of `count`, out of `runs`.

@@ -2,8 +2,7 @@
 //!
 //! [`export`] writes the controller FMU, the plant FMU and on request an SSP package that connects
 //! them; nothing is compiled and the same design gives the same bytes. [`verify`] proves the
-//! certificate of a written FMU again. [`output`] writes a set of files completely or not at all,
-//! [`Replacement`] a single one.
+//! certificate of a written FMU again; [`solved`] keeps a solved design in a file.
 //!
 //! ```no_run
 //! # fn main() -> Result<(), Box<dyn std::error::Error>> {
@@ -30,17 +29,13 @@ pub mod certificate;
 mod description;
 mod error;
 mod export;
-pub mod output;
 pub mod platform;
 mod reading;
-mod replacement;
 pub mod signature;
+pub mod solved;
 mod ssp;
-mod unfinished;
 mod verify;
 
 pub use error::Error;
 pub use export::{Exported, Options, Packed, export};
-pub use replacement::Replacement;
-pub use unfinished::abandon;
 pub use verify::{Checks, Verification, verify, verify_with};

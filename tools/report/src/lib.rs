@@ -10,12 +10,16 @@
 //! *and* gives ids that stay unique when twenty figures share a page; two of the three also fix the
 //! size in pixels and spend a third of a phone's width on the legend.
 
+pub mod as_printed;
 mod axis;
 pub mod connection;
 mod decimate;
 mod demo;
 pub mod documentation;
+pub mod estimate;
 pub mod figure;
+pub mod identification;
+mod made;
 pub mod page;
 pub mod robustness;
 pub mod running_loop;
@@ -28,6 +32,7 @@ pub mod text;
 pub mod warnings;
 
 pub use demo::{Digest, Scene, events, files, page};
+pub use made::{Made, Source};
 
 #[cfg(test)]
 mod tests;

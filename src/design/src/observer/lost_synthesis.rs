@@ -5,9 +5,10 @@
 //! `N` span what the kept sensors do not see. Only `P` is unknown. The gains are then Kalman
 //! filters, each moved towards the projection in `P` by as little as lets the function shrink.
 
+use super::ObserverDesign;
+use super::existence::PerUnit;
 use super::kalman::Filtered;
 use super::lost::{self, LostCertificate, changes, due_dwell, sets};
-use super::{ObserverDesign, PerUnit};
 use crate::augmented::scaled;
 use crate::blocks::{BlockKind, BlockName};
 use crate::certificate::{Enclosure, LyapunovMatrix, largest_ratio};

@@ -2,7 +2,8 @@
 
 use super::gain::Channel;
 use super::model::Loop;
-use super::{Claim, Scaled, Subject, SwitchingGain, prove_switching};
+use super::subject::{Claim, Scaled, Subject};
+use super::switching_proof::{SwitchingGain, prove_switching};
 use crate::Lyapunov;
 use crate::blocks::{BlockKind, BlockName};
 use crate::certificate::FactoredLyapunov;
