@@ -6,6 +6,20 @@
 //! So any range of runs can be done anywhere ([`run_shard`]), in any number of threads, and
 //! [`merge`] gives the same [`Partial`] to the last digit, whatever the order; runs that two parts
 //! share are refused rather than counted twice.
+//!
+//! ```
+//! # fn main() -> Result<(), Box<dyn std::error::Error>> {
+//! let request = design_file::read("../../examples/paper.toml".as_ref())?.request;
+//! let design = ftc_design::assembly::assemble(request)?;
+//! let options = campaign::Options::default();
+//! let first = campaign::run_shard(&design, &options, 0..3);
+//! let others = campaign::run_shard(&design, &options, 3..8);
+//! let whole = campaign::merge([others, first])?;
+//! assert_eq!(whole, campaign::run_shard(&design, &options, 0..8));
+//! println!("{}", campaign::page::text(&whole));
+//! # Ok(())
+//! # }
+//! ```
 
 mod draw;
 pub mod files;

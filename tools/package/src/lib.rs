@@ -4,21 +4,23 @@
 //! them; nothing is compiled and the same design gives the same bytes. [`verify`] proves the
 //! certificate of a written FMU again; [`solved`] keeps a solved design in a file.
 //!
-//! ```no_run
+//! With the FMU binaries of `make build`:
+//!
+//! ```
 //! # fn main() -> Result<(), Box<dyn std::error::Error>> {
-//! let request = design_file::read("heater.toml".as_ref())?.request;
+//! let request = design_file::read("../../examples/paper.toml".as_ref())?.request;
 //! let design = ftc_design::assembly::assemble(request)?;
+//! let out = tempfile::tempdir()?;
 //! let options = package::Options {
-//!     out: "out".into(),
-//!     binaries: "target/release".into(),
+//!     out: out.path().into(),
+//!     binaries: "../../target/release".into(),
 //!     ssp: false,
 //!     platforms: None,
 //!     sign: None,
 //! };
-//! for path in package::export(&design, &options)?.paths {
-//!     println!("{}", path.display());
-//! }
-//! println!("{}", package::verify("out/heater_controller.fmu".as_ref())?);
+//! let paths = package::export(&design, &options)?.paths;
+//! assert!(paths[0].ends_with("paper_controller.fmu") && paths[1].ends_with("paper_plant.fmu"));
+//! println!("{}", package::verify(&paths[0])?);
 //! # Ok(())
 //! # }
 //! ```
