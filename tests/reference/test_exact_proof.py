@@ -55,7 +55,7 @@ def bounded_real(loop: System, P: np.ndarray, level: float) -> np.ndarray:
 
 
 # By how much the reach of the disturbance and the signal are enlarged for a candidate, tried in turn.
-ROOM = [(1e-6, 1e-4), (1e-4, 1e-4), (1e-2, 1e-4), (1e-2, 1e-3), (1.0, 1e-4), (1.0, 1e-3)]
+ENLARGEMENTS = [(1e-6, 1e-4), (1e-4, 1e-4), (1e-2, 1e-4), (1e-2, 1e-3), (1.0, 1e-4), (1.0, 1e-3)]
 
 
 def storage(loop: System, level: float, reach: float, signal: float) -> np.ndarray:
@@ -73,7 +73,7 @@ def storage(loop: System, level: float, reach: float, signal: float) -> np.ndarr
 def bounded(design: dict, index: int, level: float) -> bool:
     """Whether the gain of a mode's loop is at most `level`, whatever a disturbance does."""
     rounded, exact = channels(design, index).disturbance, channels(design, index, exact=True).disturbance
-    for reach, signal in ROOM:
+    for reach, signal in ENLARGEMENTS:
         try:
             P = rationals(storage(rounded, level * (1 - 1e-5), reach, signal))
         except np.linalg.LinAlgError:
@@ -271,7 +271,7 @@ def test_gains_below_the_norm_are_not_proved(example: dict) -> None:
     """
     level = channels(example, 0).disturbance.l2_gain()
     exact = channels(example, 0, exact=True).disturbance
-    P = rationals(storage(channels(example, 0).disturbance, 1.1 * level, *ROOM[0]))
+    P = rationals(storage(channels(example, 0).disturbance, 1.1 * level, *ENLARGEMENTS[0]))
     assert not positive_definite(bounded_real(exact, P, 0.98 * level))
     assert not bounded(example, 0, 0.98 * level)
 

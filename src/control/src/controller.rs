@@ -119,7 +119,7 @@ pub struct ControllerState {
     pub observer: ObserverState,
     /// Whether the loop has the delay of the design.
     delay: DelayWatch,
-    /// The model's own run while no reading can be judged.
+    /// The model's open-loop run while no reading can be judged.
     open_loop: OpenLoop,
     /// Fault estimator.
     pub estimator: EstimatorState,

@@ -8,8 +8,8 @@ use alloc::vec;
 use alloc::vec::Vec;
 use serde::{Deserialize, Serialize};
 
-/// What a silent sensor says: no measurement, yet equal to itself.
-const SILENCE: f64 = f64::INFINITY;
+/// Stands for a missing measurement: none, yet equal to itself.
+const MISSING: f64 = f64::INFINITY;
 
 /// How often each sensor has repeated itself.
 #[derive(Debug, PartialEq, Serialize, Deserialize)]
@@ -34,9 +34,9 @@ impl Repetition {
     /// Nothing seen of any of the `outputs` sensors.
     pub fn new(outputs: usize) -> Self {
         Self {
-            last: vec![SILENCE; outputs],
+            last: vec![MISSING; outputs],
             repeats: vec![0; outputs],
-            screened: vec![SILENCE; outputs],
+            screened: vec![MISSING; outputs],
             held: false,
         }
     }
@@ -50,7 +50,7 @@ impl Repetition {
             let reading = if is_measurement(given) {
                 given
             } else {
-                SILENCE
+                MISSING
             };
             let repeated = reading == *last;
             *repeats = match (repeated, held) {
@@ -60,7 +60,7 @@ impl Repetition {
             };
             *last = reading;
             let frozen = limit > 0 && *repeats >= limit;
-            *out = if frozen { SILENCE } else { reading };
+            *out = if frozen { MISSING } else { reading };
         }
         &self.screened
     }
@@ -84,7 +84,7 @@ mod tests {
         let mut repetition = Repetition::new(1);
         let screened = readings
             .iter()
-            .map(|&value| repetition.screen(&[value], limit)[0] == SILENCE);
+            .map(|&value| repetition.screen(&[value], limit)[0] == MISSING);
         screened.collect()
     }
 

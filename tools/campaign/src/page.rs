@@ -105,7 +105,7 @@ fn key_numbers(statistics: &Statistics) -> Vec<KeyNumber> {
         ),
         key(
             rate(statistics),
-            "false alarms in a million samples of a sound sensor",
+            "false alarms in a million samples of a healthy sensor",
         ),
     ]
 }
@@ -128,7 +128,7 @@ fn percent(part: u64, whole: u64) -> String {
 
 fn rate(statistics: &Statistics) -> String {
     let alarms: u64 = statistics.false_alarms.iter().sum();
-    let samples: u64 = statistics.sound_samples.iter().sum();
+    let samples: u64 = statistics.healthy_samples.iter().sum();
     match samples {
         0 => "-".into(),
         _ => significant(1e6 * alarms as f64 / samples as f64),
@@ -316,12 +316,12 @@ fn detection(design: &Design, statistics: &Statistics) -> Section {
         caption: "False alarms".into(),
         columns: vec![
             Column::name("sensor"),
-            Column::number("samples while sound"),
+            Column::number("samples while healthy"),
             Column::number("false alarms"),
         ],
         rows: names(design)
             .iter()
-            .zip(&statistics.sound_samples)
+            .zip(&statistics.healthy_samples)
             .zip(&statistics.false_alarms)
             .map(|((name, samples), alarms)| Row {
                 cells: vec![name.clone(), samples.to_string(), alarms.to_string()],
@@ -431,10 +431,10 @@ pub fn text(whole: &Partial) -> String {
         text.push('\n');
     }
     let alarms: u64 = statistics.false_alarms.iter().sum();
-    let samples: u64 = statistics.sound_samples.iter().sum();
+    let samples: u64 = statistics.healthy_samples.iter().sum();
     let _ = writeln!(
         text,
-        "\nworse than without in {} of {} runs with faults; {alarms} false alarms in {samples} samples of sound sensors",
+        "\nworse than without in {} of {} runs with faults; {alarms} false alarms in {samples} samples of healthy sensors",
         statistics.worse_than_none, statistics.faulty_runs,
     );
     text

@@ -144,7 +144,7 @@ fn replay(
 ) -> Result<String, Failure> {
     let drawn = campaign::draw(&made.design, &arguments.options(), run);
     made.design.scenario = drawn.scenario;
-    made.design.true_plant = drawn.truth;
+    made.design.true_plant = drawn.true_plant;
     crate::simulate(made, &arguments.design, &arguments.out, false, progress)
 }
 

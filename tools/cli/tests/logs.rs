@@ -341,7 +341,7 @@ fn not_regular(bench: &Bench, arguments: &[&str], file: &str) {
 /// One damaged log: what is wrong, the first file, and words the sentence must have.
 type Case = (&'static str, String, &'static [&'static str]);
 
-/// promise: sound-logs
+/// promise: checked-logs
 #[test]
 fn damaged_logs_are_refused_in_one_sentence() {
     let good = rows(0, 200, 0);
@@ -604,7 +604,7 @@ fn damaged_logs_are_refused_in_one_sentence() {
     }
 }
 
-/// promise: sound-logs
+/// promise: checked-logs
 #[test]
 fn files_that_do_not_fit_the_modes() {
     let (one, two) = (log(&rows(0, 200, 0)), log(&rows(1, 200, 0)));

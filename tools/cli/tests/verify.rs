@@ -589,7 +589,7 @@ fn a_key_that_cannot_sign_is_refused() {
 }
 
 /// A library that offers the functions of an FMU and does nothing is found out by running it, and so
-/// is one that crashes or hangs; the program lives on.
+/// is one that crashes or hangs; the program goes on.
 ///
 /// promise: carried-proof
 #[test]

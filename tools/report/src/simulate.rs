@@ -407,8 +407,8 @@ fn metrics(runs: &[Digest], bound: Option<&[f64]>, warnings: &[String]) -> Strin
         let merits = run.merits();
         let list = |pick: fn(&Merits) -> f64| merits.iter().map(pick).collect::<Vec<f64>>();
         let mut value = json!({
-            "mse": { "measured": list(|m| m.measured.mse), "true": list(|m| m.truth.mse) },
-            "vaf": { "measured": list(|m| m.measured.vaf), "true": list(|m| m.truth.vaf) },
+            "mse": { "measured": list(|m| m.measured.mse), "true": list(|m| m.true_output.mse) },
+            "vaf": { "measured": list(|m| m.measured.vaf), "true": list(|m| m.true_output.vaf) },
         });
         if let Some(wrong) = run.wrong_modes() {
             value["wrong_mode"] = json!({ "samples": wrong.samples, "longest": wrong.longest });
@@ -457,9 +457,9 @@ fn summary(design: &Design, runs: &[Digest], bound: Option<&[f64]>) -> String {
                 run.variant.key(),
                 design.signals.outputs[output].name,
                 merits.measured.mse,
-                merits.truth.mse,
+                merits.true_output.mse,
                 vaf(merits.measured.vaf),
-                vaf(merits.truth.vaf),
+                vaf(merits.true_output.vaf),
             );
         }
     }

@@ -9,7 +9,7 @@
 //!   grows below its threshold would be followed, and never declared;
 //! * it learns only from samples in which every sensor was judged healthy and the database's error
 //!   was small: a few noise deviations, and a share of what is predicted. A plant that changed errs
-//!   in proportion to what it does; a fault that hides does not;
+//!   in proportion to what it does; a fault below its threshold does not;
 //! * what it adds to a prediction keeps within the same bounds, whatever it has learned;
 //! * it is used, sensor by sensor, only while its predictions have been better than those of the
 //!   database alone, both judged before learning from the sample.
@@ -219,7 +219,7 @@ mod tests {
         assert!(adapted.abs() <= fixed.abs() + 1e-12);
     }
 
-    /// A fault that grows slowly enough to stay unseen was once followed to any size.
+    /// A fault that grows slowly enough to stay undetected was once followed to any size.
     #[test]
     fn a_fault_that_grows_unseen_is_not_followed() {
         let known = predictor(&[1.0, 0.5], 10.0);

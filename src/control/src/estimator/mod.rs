@@ -426,7 +426,7 @@ impl EstimatorState {
     }
 
     /// Decides sensor by sensor; `validity` is absent when the residual means nothing now.
-    /// Returns whether the residual was judged and every sensor found healthy beyond suspicion.
+    /// Returns whether the residual was judged and every sensor found healthy, with its residual well below the threshold.
     fn decide(
         &mut self,
         estimator: &Estimator,

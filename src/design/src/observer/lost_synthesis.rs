@@ -51,7 +51,7 @@ pub(super) fn common_function(demands: &[Demand], decay: f64) -> Option<DMatrix<
     for wanted in demands {
         let (a, basis) = match wanted {
             Demand::Fixed(error) => (error, DMatrix::identity(n, n)),
-            Demand::Free(filter, lost) => (&filter.a, unseen(&filter.kept(lost).0)),
+            Demand::Free(filter, lost) => (&filter.a, unmeasured(&filter.kept(lost).0)),
         };
         if basis.ncols() == 0 {
             continue;
@@ -68,7 +68,7 @@ pub(super) fn common_function(demands: &[Demand], decay: f64) -> Option<DMatrix<
 }
 
 /// An orthonormal basis of what the rows of `c` do not see.
-fn unseen(c: &DMatrix<f64>) -> DMatrix<f64> {
+fn unmeasured(c: &DMatrix<f64>) -> DMatrix<f64> {
     let n = c.ncols();
     if c.nrows() == 0 || c.amax() == 0.0 {
         return DMatrix::identity(n, n);

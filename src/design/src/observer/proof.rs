@@ -7,11 +7,8 @@ use crate::Lyapunov;
 use crate::blocks::BlockKind;
 #[cfg(feature = "solver")]
 use crate::certificate::largest_ratio;
-use crate::certificate::{
-    CertificateError, Enclosure, check_dwell, growth_block, prove, require, scaled_plant,
-};
+use crate::certificate::{CertificateError, Enclosure, check_dwell, growth_block, prove, require};
 use crate::lyapunov::all_pairs;
-use crate::matrices::dense;
 use crate::units::is_unit;
 use ftc_control::Matrix;
 use ftc_control::parameters::ObserverKind;

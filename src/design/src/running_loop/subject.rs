@@ -155,7 +155,7 @@ impl<'a> Subject<'a> {
 }
 
 /// Standard deviation of each command (m) for that of each sensor (p), all in per-unit.
-fn command_deviation(model: &Loop, deviations: &[f64]) -> Option<Vec<f64>> {
+pub(super) fn command_deviation(model: &Loop, deviations: &[f64]) -> Option<Vec<f64>> {
     let spread = |matrix: &DMatrix<f64>| {
         let mut scaled = matrix.clone();
         for (mut column, factor) in scaled.column_iter_mut().zip(deviations) {
