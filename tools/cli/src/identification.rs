@@ -52,27 +52,17 @@ impl Arguments {
 
 /// Identifies a plant; returns the text of the design file, and what there is to say.
 pub fn identify(arguments: &Arguments) -> Result<(String, String), Failure> {
-    let Arguments {
-        logs,
-        out,
-        inputs,
-        outputs,
-        time,
-        sample_time,
-        period,
-        harmonics,
-        order,
-    } = arguments.clone();
+    let given = arguments.clone();
     let asked = Asked {
-        logs,
-        out,
-        inputs,
-        outputs,
-        time,
-        sample_time,
-        period,
-        harmonics,
-        order,
+        logs: given.logs,
+        out: given.out,
+        inputs: given.inputs,
+        outputs: given.outputs,
+        time: given.time,
+        sample_time: given.sample_time,
+        period: given.period,
+        harmonics: given.harmonics,
+        order: given.order,
     };
     let found = identification::identify(&asked)
         .map_err(|error| Failure::Input(error.worded(crate::failure::option)))?;
