@@ -103,8 +103,16 @@ fn resets_more_often_than_proved_are_refused() {
     ftc_design::coverage::prove(&design).unwrap();
 
     let mut too_soon = design.clone();
-    too_soon.controller.feedback.transfer.as_mut().unwrap().samples = 1;
-    let sentence = ftc_design::coverage::prove(&too_soon).unwrap_err().to_string();
+    too_soon
+        .controller
+        .feedback
+        .transfer
+        .as_mut()
+        .unwrap()
+        .samples = 1;
+    let sentence = ftc_design::coverage::prove(&too_soon)
+        .unwrap_err()
+        .to_string();
     assert!(sentence.contains("bumpless"), "{sentence}");
     let proof = &mut too_soon.proof.as_mut().unwrap().running_loop;
     proof.transfer.as_mut().unwrap().mu = 1.0;
