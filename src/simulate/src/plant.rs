@@ -15,7 +15,7 @@ use ftc_control::state::State;
 use ftc_control::{Matrix, kernel};
 use ftc_design::plain;
 use ftc_plant::TruePlant;
-use ftc_plant::noise;
+use ftc_plant::noise::Noise;
 use ftc_plant::scenario::{FaultEvent, Scenario};
 use ftc_plant::{Deviation, Mode, SwitchedPlant};
 use schedule::{Schedule, Signal};
@@ -29,6 +29,8 @@ pub struct PlantSimulator {
     deviation: Deviation,
     scenario: Scenario,
     schedule: Schedule,
+    /// None where no sensor has any.
+    noise: Option<Noise>,
     modes: Vec<Dynamics>,
 }
 
@@ -175,6 +177,7 @@ impl PlantSimulator {
         Self {
             modes: plant.modes.iter().map(Dynamics::new).collect(),
             schedule: Schedule::new(&scenario, plant.sample_time),
+            noise: (scenario.noise.iter().any(|&d| d != 0.0)).then(|| Noise::new(scenario.seed)),
             plant,
             true_plant,
             deviation,
@@ -333,20 +336,19 @@ impl PlantSimulator {
     }
 
     fn draw_noise(&self, state: &mut PlantState, on: bool) {
-        let deviation = &self.scenario.noise;
-        if !on || deviation.iter().all(|&d| d == 0.0) {
+        let Some(noise) = self.noise.as_ref().filter(|_| on) else {
             state.noise.fill(0.0);
             state.drawn = None;
             return;
-        }
+        };
         if state.drawn.replace(state.tick) == Some(state.tick) {
             return;
         }
-        noise::standard_normal(self.scenario.seed, state.tick, &mut state.noise);
+        noise.draw(state.tick, &mut state.noise);
         state
             .noise
             .iter_mut()
-            .zip(deviation)
+            .zip(&self.scenario.noise)
             .for_each(|(value, d)| *value *= d);
     }
 
