@@ -130,6 +130,38 @@ impl Access {
     }
 }
 
+/// What the usual call asks of a variable, one bit each: the states in which it may be set to whatever
+/// value, its type, whether it is an input, whether it is latched.
+#[derive(Clone, Copy, Debug)]
+struct Mark(u16);
+
+impl Mark {
+    const INPUT: u16 = 1 << 12;
+    const NOT_LATCHED: u16 = 1 << 13;
+
+    fn of(access: &Access, latched: bool) -> Self {
+        let settable = match access.range {
+            None => access.settable.bits(),
+            Some(_) => 0,
+        };
+        let input = match access.causality {
+            Causality::Input => Self::INPUT,
+            _ => 0,
+        };
+        let other = if latched { 0 } else { Self::NOT_LATCHED };
+        Self(settable | Self::typed(access.base) | input | other)
+    }
+
+    /// A variable of this type.
+    const fn typed(base: Base) -> u16 {
+        match base {
+            Base::Real => 1 << 9,
+            Base::Integer => 1 << 10,
+            Base::Boolean => 1 << 11,
+        }
+    }
+}
+
 /// What an instance has told the importer, once each; not part of a saved state.
 #[derive(Clone, Copy, Debug, Default)]
 struct Told {
@@ -149,6 +181,7 @@ pub struct Component<S: Slave> {
     slave: S,
     guid: String,
     access: Box<[Access]>,
+    marks: Box<[Mark]>,
     current: Snapshot<S::State>,
     /// The state after fmi2Instantiate.
     fresh: Snapshot<S::State>,
@@ -176,15 +209,17 @@ impl<S: Slave> Component<S> {
         }
         let start = Values::start(slave.variables());
         let (footprint, fresh) = memory::size_of_made(|| Snapshot::fresh(&slave));
+        let variables = slave.variables().iter();
+        let access: Box<[Access]> = variables.map(|(_, it)| Access::of(it)).collect();
         Ok(Self {
             logger,
             messages: Vec::new(),
             guid: guid.to_string(),
-            access: slave
-                .variables()
-                .iter()
-                .map(|(_, variable)| Access::of(variable))
+            marks: (0..)
+                .zip(&access)
+                .map(|(reference, access)| Mark::of(access, slave.is_latched(reference)))
                 .collect(),
+            access,
             current: fresh.clone(),
             footprint: footprint + size_of::<Snapshot<S::State>>(),
             trial: fresh.state.clone(),
@@ -274,7 +309,7 @@ impl<S: Slave> Component<S> {
         convert: impl Fn(f64) -> Option<T>,
     ) -> Outcome {
         self.refresh()?;
-        if !self.all(references, |access| access.base == base) {
+        if self.common(references) & Mark::typed(base) == 0 {
             for &reference in references {
                 self.access(reference, base)?;
             }
@@ -286,12 +321,11 @@ impl<S: Slave> Component<S> {
         Ok(())
     }
 
-    /// Whether all of these variables exist and pass the test.
+    /// The marks that all of these variables have; none where one does not exist.
     #[inline]
-    fn all(&self, references: &[ValueReference], test: impl Fn(&Access) -> bool) -> bool {
-        references
-            .iter()
-            .all(|&reference| self.access.get(reference as usize).is_some_and(&test))
+    fn common(&self, references: &[ValueReference]) -> u16 {
+        let mark = |&reference| self.marks.get(reference as usize).map_or(0, |mark| mark.0);
+        references.iter().fold(u16::MAX, |all, it| all & mark(it))
     }
 
     /// Sets values of one type; nothing is set from a call with one bad entry.
@@ -303,19 +337,21 @@ impl<S: Slave> Component<S> {
         convert: impl Fn(T) -> f64,
     ) -> Outcome {
         let phase = self.phase();
-        let free = |access: &Access| {
-            access.base == base && access.range.is_none() && access.settable.contain(phase)
-        };
-        if !self.all(references, free) {
+        let free = Mark::typed(base) | phase as u16;
+        if self.common(references) & free != free {
             self.check_each(base, references, values, &convert)?;
         }
+        let mut marks = 0;
         for (&reference, &value) in references.iter().zip(values) {
-            if let Some(slot) = self.current.values.slot(reference) {
+            let mark = self.marks.get(reference as usize);
+            if let (Some(slot), Some(mark)) = (self.current.values.slot(reference), mark) {
                 *slot = convert(value);
+                marks |= mark.0;
             }
-            let access = self.access.get(reference as usize);
-            self.current.handed_over |=
-                access.is_some_and(|access| access.causality == Causality::Input);
+        }
+        self.current.handed_over |= marks & Mark::INPUT != 0;
+        if marks & Mark::NOT_LATCHED != 0 {
+            self.current.values.unsettle();
         }
         self.current.stale = phase == State::InitializationMode;
         Ok(())
