@@ -2,6 +2,7 @@
 
 mod departure;
 mod derivative;
+mod energy;
 mod injection;
 mod rectifier;
 mod schedule;
@@ -11,6 +12,7 @@ pub use injection::{Injected, LAST_INJECTED_KIND};
 
 use super::integrate::Stalled;
 use departure::Departed;
+use energy::Sampled;
 use ftc_control::state::State;
 use ftc_control::{Matrix, kernel};
 use ftc_design::plain;
@@ -31,6 +33,8 @@ pub struct PlantSimulator {
     schedule: Schedule,
     /// None where no sensor has any.
     noise: Option<Noise>,
+    /// A rectifier's, prepared for its sample time.
+    sampled: Option<Sampled>,
     modes: Vec<Dynamics>,
 }
 
@@ -174,7 +178,12 @@ impl PlantSimulator {
     ) -> Self {
         let plant = true_plant.linear(&designed).clone();
         let (true_plant, deviation) = true_plant.into_parts();
+        let sampled = match &true_plant {
+            TruePlant::Rectifier(rectifier) => Sampled::new(rectifier, plant.sample_time),
+            TruePlant::AsDesigned | TruePlant::Linear { .. } | TruePlant::Deviating { .. } => None,
+        };
         Self {
+            sampled,
             modes: plant.modes.iter().map(Dynamics::new).collect(),
             schedule: Schedule::new(&scenario, plant.sample_time),
             noise: (scenario.noise.iter().any(|&d| d != 0.0)).then(|| Noise::new(scenario.seed)),
@@ -305,7 +314,7 @@ impl PlantSimulator {
         let u = applied.as_slice();
         let result = match &self.true_plant {
             TruePlant::Rectifier(rectifier) => rectifier::advance_rectifier(
-                rectifier,
+                (rectifier, self.sampled.as_ref()),
                 state.mode,
                 &mut state.x,
                 u,
