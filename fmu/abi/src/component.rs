@@ -310,13 +310,21 @@ impl<S: Slave> Component<S> {
     ) -> Outcome {
         self.refresh()?;
         if self.common(references) & Mark::typed(base) == 0 {
-            for &reference in references {
-                self.access(reference, base)?;
-            }
+            self.check_types(references, base)?;
         }
         for (&reference, slot) in references.iter().zip(out) {
             let value = self.current.values.at(reference).unwrap_or_default();
             *slot = convert(value).ok_or_else(|| self.not_of(base, reference, value))?;
+        }
+        Ok(())
+    }
+
+    /// Whether each of these variables exists and is of this type.
+    #[cold]
+    #[inline(never)]
+    fn check_types(&self, references: &[ValueReference], base: Base) -> Outcome {
+        for &reference in references {
+            self.access(reference, base)?;
         }
         Ok(())
     }
@@ -358,6 +366,8 @@ impl<S: Slave> Component<S> {
     }
 
     /// Whether each of these values may be set.
+    #[cold]
+    #[inline(never)]
     fn check_each<T: Copy>(
         &self,
         base: Base,
@@ -403,11 +413,8 @@ impl<S: Slave> Component<S> {
             }
         };
         let late = self.run_ticks(waits, &before)?;
-        if let Some(k) = late
-            && !std::mem::replace(&mut self.told.late_inputs, true)
-        {
-            let text = late_inputs(&before, k, length);
-            self.warn(Function::DoStep, &text);
+        if let Some(k) = late {
+            self.tell_late_inputs(&before, k, length);
         }
         if !self.told.notice
             && let Some(text) = self.slave.notice(&self.current.state)
@@ -420,11 +427,16 @@ impl<S: Slave> Component<S> {
             return Ok(());
         }
         self.current.phase = State::StepFailed;
-        Err(Failure::discard(format!(
-            "a step of {length} s runs more than {MOST_TICKS} ticks of {te} s and was done up to \
-             {now} s; make steps of at most {} s",
-            MOST_TICKS as f64 * te
-        )))
+        Err(too_long(length, te, now))
+    }
+
+    /// Warns, once, of inputs from before the tick that they were for.
+    #[cold]
+    fn tell_late_inputs(&mut self, before: &Clock, k: u64, length: f64) {
+        if !std::mem::replace(&mut self.told.late_inputs, true) {
+            let text = late_inputs(before, k, length);
+            self.warn(Function::DoStep, &text);
+        }
     }
 
     /// Checks the inputs that the coming ticks read; says whether the mode is still untold.
@@ -439,12 +451,17 @@ impl<S: Slave> Component<S> {
         match self.slave.check_inputs(&current.values)? {
             Readiness::Complete => Ok(false),
             Readiness::ModeUntold(_) if current.provisional => Ok(true),
-            Readiness::ModeUntold(mode) => Err(Failure::error(format!(
-                "{} is 0, which means not told yet, after a mode had been told: the modes are the \
-                 whole numbers from 1 on",
-                self.name(mode)
-            ))),
+            Readiness::ModeUntold(mode) => Err(self.untold(mode)),
         }
+    }
+
+    #[cold]
+    fn untold(&self, mode: ValueReference) -> Failure {
+        Failure::error(format!(
+            "{} is 0, which means not told yet, after a mode had been told: the modes are the \
+             whole numbers from 1 on",
+            self.name(mode)
+        ))
     }
 
     /// Runs the ticks up to the clock's time; while the slave `waits` for its mode they pass and
@@ -672,6 +689,8 @@ impl<S: Slave> Component<S> {
         )))
     }
 
+    #[cold]
+    #[inline(never)]
     fn not_settable(&self, reference: ValueReference, access: Access) -> Failure {
         let name = self.name(reference);
         Failure::error(match access.causality {
@@ -686,6 +705,8 @@ impl<S: Slave> Component<S> {
     }
 
     /// Refuses a value that is none of the type asked for.
+    #[cold]
+    #[inline(never)]
     fn not_of(&self, base: Base, reference: ValueReference, value: f64) -> Failure {
         let name = self.name(reference);
         Failure::error(format!("{name} is {value}, which is no {base:?}"))
@@ -734,6 +755,16 @@ fn address<T>(saved: &Saved<T>) -> usize {
 /// A number of six digits, for a sentence.
 fn shortened(value: f64) -> f64 {
     format!("{value:.5e}").parse().unwrap_or(value)
+}
+
+/// A step of more ticks than are run at once.
+#[cold]
+fn too_long(length: f64, te: f64, now: f64) -> Failure {
+    Failure::discard(format!(
+        "a step of {length} s runs more than {MOST_TICKS} ticks of {te} s and was done up to \
+         {now} s; make steps of at most {} s",
+        MOST_TICKS as f64 * te
+    ))
 }
 
 /// The warning that a tick ran on inputs from before it began.

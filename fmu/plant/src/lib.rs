@@ -93,7 +93,11 @@ impl PlantFmu {
     }
 
     fn injected<'a>(&self, values: &'a Values) -> Injected<'a> {
-        let [kind, size, from, until] = self.spans.injected.map(|span| values.get(span));
+        let spans = self.spans.injected;
+        if values.get(spans[0]).iter().all(|&kind| kind == 0.0) {
+            return Injected::default();
+        }
+        let [kind, size, from, until] = spans.map(|span| values.get(span));
         Injected {
             kind,
             size,

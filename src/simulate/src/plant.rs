@@ -289,8 +289,8 @@ impl PlantSimulator {
             *out = value(signal) + added;
         }
         self.draw_noise(state, external.noise);
-        kernel::affine(&mut state.y_true, &mode.output_offset, &mode.c, &state.x);
-        kernel::add_product(&mut state.y_true, &mode.f, &state.disturbance);
+        let seen = [(&mode.c, &*state.x), (&mode.f, &*state.disturbance)];
+        kernel::affine_sum(&mut state.y_true, &mode.output_offset, seen);
         kernel::bound(&mut state.y_true);
         self.read_sensors(state, built_in);
     }
@@ -338,9 +338,12 @@ impl PlantSimulator {
         let Some(mode) = self.modes.get(state.mode) else {
             return;
         };
-        kernel::affine(&mut state.next, &mode.state_offset, &mode.a, &state.x);
-        kernel::add_product(&mut state.next, &mode.b, u);
-        kernel::add_product(&mut state.next, &mode.e, &state.disturbance);
+        let moved = [
+            (&mode.a, &*state.x),
+            (&mode.b, u),
+            (&mode.e, &*state.disturbance),
+        ];
+        kernel::affine_sum(&mut state.next, &mode.state_offset, moved);
         kernel::copy(&mut state.x, &state.next);
     }
 
