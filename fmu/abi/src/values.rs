@@ -75,9 +75,9 @@ impl Values {
     /// Whether every element of a vector is a finite number.
     #[inline]
     pub fn are_finite(&self, span: Span) -> bool {
-        // The difference is 0, or no number.
-        let sum: f64 = self.get(span).iter().map(|value| value - value).sum();
-        sum == 0.0
+        // No difference of infinities: a host may have traps enabled.
+        let finite = |all: bool, value: &f64| all & value.is_finite();
+        self.get(span).iter().fold(true, finite)
     }
 
     /// The value of a scalar; 0 if the span is empty.
