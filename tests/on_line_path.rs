@@ -171,7 +171,7 @@ proptest! {
 fn wrong_sizes_are_refused_by_field() {
     use ftc_control::{ControllerError, ControllerParameters, Matrix, SampleError};
     type Damage = fn(&mut ControllerParameters);
-    let damage: [(&str, Damage); 9] = [
+    let damage: [(&str, Damage); 13] = [
         ("modes[1].b", |p| p.modes[1].b = Matrix::zeros(2, 1)),
         ("modes[0].x0", |p| p.modes[0].x0[0] = f64::NAN),
         ("feedback.tracked", |p| p.feedback.tracked = vec![0, 2]),
@@ -186,6 +186,18 @@ fn wrong_sizes_are_refused_by_field() {
         ("estimator.predictors[0].factor", |p| {
             p.estimator.predictors[0].factor = Matrix::identity(3);
         }),
+        ("estimator.tuning.bank.kept", |p| {
+            p.estimator.tuning.bank.kept = 13.0
+        }),
+        ("estimator.tuning.bank.quiet_beside", |p| {
+            p.estimator.tuning.bank.quiet_beside = f64::NAN;
+        }),
+        ("estimator.tuning.database.learning_share", |p| {
+            p.estimator.tuning.database.learning_share = -1.0;
+        }),
+        ("estimator.tuning.delay.squares_ratio", |p| {
+            p.estimator.tuning.delay.squares_ratio = 0.0;
+        }),
         ("input_limits", |p| p.input_limits.truncate(1)),
     ];
     for (field, damage) in damage {
@@ -196,6 +208,7 @@ fn wrong_sizes_are_refused_by_field() {
             ControllerError::Length { field, .. }
             | ControllerError::Shape { field, .. }
             | ControllerError::NotFinite { field }
+            | ControllerError::Bounds { field, .. }
             | ControllerError::Range { field, .. } => field,
             other => panic!("{other}"),
         };

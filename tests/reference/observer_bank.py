@@ -18,38 +18,6 @@ from observer_filter import NOBODY, Hypothesis, Motion, Plant, Reading, Seen, bo
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-# The tuning constants of the bank, as src/control/src/tuning.rs describes them.
-BANK = {
-    "kept": 12,
-    "per_sensor_set": 2,
-    "unflagged_range": 30.0,
-    "quiet": 8.0,
-    "several": 1.5,
-    "everything": 2.0,
-    "start_fault": -4.6,
-    "gain_fault_mean": -0.5,
-    "gain_fault_variance": 0.25,
-    "load_remainder": 0.01,
-    "load_at_start": 0.3,
-    "same_estimate": 0.1,
-    "frozen_evidence": 4.0,
-    "repeat_evidence": 5.0,
-    "displaced": 36.0,
-    "returned": 4.0,
-    "misfit_share": 0.1,
-    "noise_at_start": 4.0,
-    "noise_prior": 25.0,
-    "noise_memory": 300.0,
-    "noise_limit": 100.0,
-    "outlier": 9.0,
-    "switch_restart": 3.0,
-    "fading": 0.05,
-    "run_memory": 300.0,
-    "run_share": [0.02, 1.0],
-    "usual_load": 1000.0,
-    "start_deviations": 3.0,
-}
-
 
 class OwnRun:
     """What the plant would do under the commands alone, or with the usual loads, and how far that is right."""
@@ -72,7 +40,9 @@ class OwnRun:
     @property
     def share(self) -> np.ndarray:
         """How large the error of each output has been, relative to what is allowed."""
-        return np.clip(self.error / np.maximum(self.allowed, 5e-324), *self.tuning["run_share"])
+        return np.clip(
+            self.error / np.maximum(self.allowed, 5e-324), self.tuning["run_share_least"], self.tuning["run_share_most"]
+        )
 
     @property
     def covariance(self) -> np.ndarray:
@@ -184,10 +154,11 @@ class Bank:
         """Rests at the operating point of `mode`; where the mode is not told, at that of any other as well."""
         estimator = design["controller"]["estimator"]
         self.settings = estimator["hypotheses"]
-        self.tuning = BANK
+        self.tuning = estimator["tuning"]["bank"]
         fitted = self.settings.get("fitted") or []
         modes = record.modes(design)
-        self.plants = [Plant(m, self.settings, fitted[i] if fitted else None) for i, m in enumerate(modes)]
+        te = record.sample_time(design)
+        self.plants = [Plant(m, self.settings, te, fitted[i] if fitted else None) for i, m in enumerate(modes)]
         self.at = self.plants[0].layout
         self.trusts_model = self.settings["ambiguous"] == "trust-model"
         self.outputs_may_err = self.at.p > self.at.n
@@ -263,7 +234,7 @@ class Bank:
             not head.flagged
             and not head.loose
             and seen.sound
-            and seen.square < self.tuning["quiet"] + 2.0 * self.at.p
+            and seen.square < self.tuning["quiet_beside"] + self.tuning["quiet_per_output"] * self.at.p
             and bool(np.all(self.repeats.evidence < self.tuning["frozen_evidence"]))
             and not self.first
             and not self.apart
@@ -502,7 +473,10 @@ class Proposals:
         self.bank, self.index, self.h, self.reading = bank, index, h, reading
         self.plant, self.at, self.tuning, self.price = bank.plants[h.mode], bank.at, bank.tuning, bank.price
         self.seen = bank.seen[id(h)]
-        self.unlikely = self.seen.square > min(self.tuning["quiet"], 4.0 + self.at.p)
+        self.unlikely = self.seen.square > min(
+            self.tuning["quiet_beside"],
+            self.tuning["unlikely_beside"] + self.tuning["unlikely_per_output"] * self.at.p,
+        )
         self.fault_size = np.array(bank.settings["fault_size"])
         self.stay = h.score + self.seen.likelihood
         if h is not bank.best and self._has_come_to_nothing():
@@ -646,7 +620,7 @@ class Proposals:
         if not drifted or (not bank.trusts_model and known):
             return
         seen = self._run_seen(bank.own, drifted)
-        if seen.square >= self.tuning["quiet"] + 2.0 * self.at.p:
+        if seen.square >= self.tuning["quiet_beside"] + self.tuning["quiet_per_output"] * self.at.p:
             return
         score = self.stay
         if bank.trusts_model:

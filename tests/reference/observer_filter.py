@@ -79,14 +79,17 @@ class Layout:
 class Plant:
     """One mode as the estimator knows it."""
 
-    def __init__(self, mode: record.Mode, settings: dict, fitted: dict | None) -> None:
+    def __init__(self, mode: record.Mode, settings: dict, sample_time: float, fitted: dict | None) -> None:
         """Forms matrices and sizes from the design and, where there are logs, from what they say."""
         self.A, self.B = (np.array(fitted[key]) for key in "ab") if fitted else (mode.A, mode.B)
         self.C, self.x0, self.u0 = mode.C, mode.x0, mode.u0
         n, m, p = len(self.A), self.B.shape[1], len(self.C)
         E, F = mode.E.reshape(n, -1), mode.F.reshape(p, -1)
         s = len(settings["disturbance_load"])
-        angles = settings["angles"]
+        period = settings.get("period") or {"seconds": 1.0, "harmonics": 0}
+        turn = 2 * math.pi * sample_time / period["seconds"]
+        angles = [(k + 1) * turn for k in range(period["harmonics"])]
+        self.angles = np.tile(angles, s)
         self.a = self.x0 - self.A @ self.x0 - self.B @ self.u0
         self.c = mode.y0 - self.C @ self.x0
         # Each harmonic of each channel is a pair of states, of which the first is the channel's signal.
@@ -291,9 +294,8 @@ class Hypothesis:
         Q[at.gain] += settings["gain_walk"] ** 2
         # So does the error of the period as the disturbance turns.
         pairs = self.z[at.wave].reshape(-1, 2)
-        angles = np.tile(settings["angles"], at.s)
         sizes = np.array(settings["disturbance_size"])[0::2]
-        turning = (settings["period_error"] * angles) ** 2 * (pairs**2).sum(axis=1) + 1e-8 * sizes**2
+        turning = (settings["period_error"] * plant.angles) ** 2 * (pairs**2).sum(axis=1) + 1e-8 * sizes**2
         Q[at.wave] += np.repeat(turning, 2)
         if motion.outputs_may_err:
             Q[at.fault] += error * plant.C**2 @ moved

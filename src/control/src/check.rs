@@ -256,6 +256,14 @@ impl Estimator {
 fn estimator(estimator: &Estimator, sizes: Sizes) -> Checked {
     let p = sizes.outputs;
     estimator.check_memory(sizes.inputs)?;
+    if let Some((part, name, bounds)) = estimator.tuning.beyond_bounds() {
+        let [least, most] = bounds;
+        return Err(ControllerError::Bounds {
+            field: format!("estimator.tuning.{part}.{name}"),
+            least,
+            most,
+        });
+    }
     vector("estimator.thresholds", &estimator.thresholds, p)?;
     vector("estimator.largest_fault", &estimator.largest_fault, p)?;
     range(
@@ -300,7 +308,19 @@ const LARGEST_SHARE: f64 = 1e6;
 fn hypotheses(settings: &Hypotheses, sizes: Sizes) -> Checked {
     let (n, m, p) = (sizes.states, sizes.inputs, sizes.outputs);
     let s = sizes.disturbances;
-    let waves = (2 * s).saturating_mul(settings.angles.len());
+    let harmonics = settings.period.map_or(0, |known| known.harmonics);
+    range(
+        harmonics <= MOST_HARMONICS,
+        "estimator.hypotheses.period.harmonics",
+        "must be at most 50",
+    )?;
+    let period = settings.period.map_or(1.0, |known| known.seconds);
+    range(
+        period.is_finite() && period > 0.0,
+        "estimator.hypotheses.period.seconds",
+        "must be a positive number of seconds",
+    )?;
+    let waves = (2 * s).saturating_mul(harmonics);
     range(
         waves.saturating_add(2 * n + m + p) <= LARGEST_JOINT_STATE,
         "estimator.hypotheses",
@@ -313,11 +333,7 @@ fn hypotheses(settings: &Hypotheses, sizes: Sizes) -> Checked {
         ("input_load", &settings.input_load, m),
         ("disturbance_load", &settings.disturbance_load, s),
         ("disturbance_walk", &settings.disturbance_walk, s),
-        (
-            "disturbance_size",
-            &settings.disturbance_size,
-            2 * s * settings.angles.len(),
-        ),
+        ("disturbance_size", &settings.disturbance_size, waves),
         ("state_load", &settings.state_load, n),
         ("state_size", &settings.state_size, n),
         ("start", &settings.start, n),
@@ -372,12 +388,13 @@ fn hypotheses(settings: &Hypotheses, sizes: Sizes) -> Checked {
         settings.gain_walk,
         settings.period_error,
     ];
-    let mut shares = shares.iter().chain(&settings.angles);
-    let sensible = shares.all(|share| (0.0..=LARGEST_SHARE).contains(share));
+    let sensible = shares
+        .iter()
+        .all(|share| (0.0..=LARGEST_SHARE).contains(share));
     range(
         sensible,
         "estimator.hypotheses",
-        "must have shares and angles from 0 to 1e6",
+        "must have shares from 0 to 1e6",
     )
 }
 

@@ -119,7 +119,7 @@ pub struct ControllerState {
     pub observer: ObserverState,
     /// Whether the loop has the delay of the design.
     delay: DelayWatch,
-    /// The model's own run while no reading can be judged.
+    /// The model in open loop while no reading can be judged.
     open_loop: OpenLoop,
     /// Fault estimator.
     pub estimator: EstimatorState,
@@ -172,7 +172,14 @@ impl Controller {
         ) {
             (EstimatorMethod::Observer, Some(settings)) => {
                 let thresholds = &parameters.estimator.thresholds;
-                Some(Bank::new(&parameters.modes, settings, thresholds))
+                let tuning = parameters.estimator.tuning.bank;
+                Some(Bank::new(
+                    &parameters.modes,
+                    parameters.sample_time,
+                    settings,
+                    tuning,
+                    thresholds,
+                ))
             }
             _ => None,
         };
@@ -358,15 +365,16 @@ impl Controller {
             designed: &state.acting,
             newest: &state.command,
         };
+        let tuning = &self.parameters.estimator.tuning.delay;
         state
             .delay
-            .watch((observer, gain), model, modes, y, commands);
+            .watch((observer, gain), model, modes, y, commands, tuning);
     }
 
     /// Whether a state has the sizes of this controller; one that came as bytes may not.
     pub fn fits(&self, state: &ControllerState) -> bool {
-        let sound = state.bank.as_ref().is_none_or(BankState::sound);
-        sound && state.same_shape(&self.initial_state(0))
+        let consistent = state.bank.as_ref().is_none_or(BankState::is_consistent);
+        consistent && state.same_shape(&self.initial_state(0))
     }
 
     /// Notes the mode and returns the one just left. A switch that was found a sample late, the plant
@@ -433,7 +441,8 @@ impl Controller {
         );
         if estimated {
             let held = state.estimator.held(settings);
-            let (thresholds, corrected) = (sample.thresholds, &mut state.corrected);
+            let most = settings.tuning.database.open_loop_thresholds;
+            let (thresholds, corrected) = ((most, sample.thresholds), &mut state.corrected);
             let expected = &state.substitute;
             state
                 .open_loop

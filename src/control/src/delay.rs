@@ -11,7 +11,7 @@ use super::kernel;
 use super::observer::{ObservedMode, ObserverState};
 use super::parameters::Observer;
 use crate::matrix::Matrix;
-use crate::tuning::DELAY;
+use crate::tuning::DelayTuning;
 use alloc::vec;
 use alloc::vec::Vec;
 use serde::{Deserialize, Serialize};
@@ -114,6 +114,7 @@ impl DelayWatch {
         (from, to): (usize, usize),
         y: &[f64],
         commands: Commands<'_>,
+        tuning: &DelayTuning,
     ) {
         if self.over {
             return;
@@ -142,37 +143,39 @@ impl DelayWatch {
         }
         kernel::copy(&mut self.acted, commands.designed);
         self.samples += u32::from(moved);
-        if self.samples >= DELAY.least_samples {
-            self.decide();
+        if f64::from(self.samples) >= tuning.least_samples {
+            self.decide(tuning);
         }
     }
 
-    fn decide(&mut self) {
+    fn decide(&mut self, tuning: &DelayTuning) {
         let Some((designed, others)) = self.runs.split_first() else {
             return;
         };
-        let smaller = libm::log(DELAY.squares_ratio);
+        let smaller = libm::log(tuning.squares_ratio);
         let (mut found, mut lead, mut all_worse) = (None, 0.0, true);
         for (at, delay) in [Delay::Longer, Delay::Shorter].into_iter().enumerate() {
             let Some(other) = others.get(at) else { break };
-            let fit = self.compare(designed, other);
-            all_worse &= -fit.ratio > DELAY.log_ratio && -fit.least > smaller;
+            let fit = self.compare(designed, other, tuning.zero);
+            all_worse &= -fit.ratio > tuning.log_ratio && -fit.least > smaller;
             if fit.ratio > lead {
                 lead = fit.ratio;
                 // It must beat the rest as clearly.
                 let mut rest = others.iter().enumerate().filter(|(index, _)| *index != at);
-                let beaten =
-                    rest.all(|(_, rest)| self.compare(rest, other).ratio > DELAY.log_ratio);
-                let clear = fit.ratio > DELAY.log_ratio && fit.most > smaller && beaten;
+                let beaten = rest.all(|(_, rest)| {
+                    self.compare(rest, other, tuning.zero).ratio > tuning.log_ratio
+                });
+                let clear = fit.ratio > tuning.log_ratio && fit.most > smaller && beaten;
                 found = clear.then_some(delay);
             }
         }
         self.found = found;
-        self.over = self.found.is_some() || all_worse || self.samples >= DELAY.most_samples;
+        self.over =
+            self.found.is_some() || all_worse || f64::from(self.samples) >= tuning.most_samples;
     }
 
-    /// How much better than `reference` a run fits the readings.
-    fn compare(&self, reference: &Run, run: &Run) -> Fit {
+    /// How much better than `reference` a run fits the readings; less than `zero` of them is no innovation.
+    fn compare(&self, reference: &Run, run: &Run, zero: f64) -> Fit {
         let half = f64::from(self.samples) / 2.0;
         let pairs = reference.squares.iter().zip(&run.squares);
         let mut fit = Fit {
@@ -181,7 +184,7 @@ impl DelayWatch {
             least: 0.0,
         };
         for ((reference, run), reading) in pairs.zip(&self.readings) {
-            let nothing = DELAY.zero * reading + f64::MIN_POSITIVE;
+            let nothing = zero * reading + f64::MIN_POSITIVE;
             let of_output = libm::log((reference + nothing) / (run + nothing));
             fit.ratio += half * of_output;
             fit.most = fit.most.max(of_output);

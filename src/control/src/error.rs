@@ -32,6 +32,16 @@ pub enum ControllerError {
         /// Path of the field.
         field: String,
     },
+    /// A number is beyond fixed bounds.
+    #[error("{field} must be a number from {least} to {most}")]
+    Bounds {
+        /// Path of the field.
+        field: String,
+        /// The least it may be.
+        least: f64,
+        /// The most it may be.
+        most: f64,
+    },
     /// A value is out of its range.
     #[error("{field} {rule}")]
     Range {

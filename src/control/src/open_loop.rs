@@ -8,7 +8,6 @@
 
 use super::kernel;
 use super::observer::ObservedMode;
-use crate::tuning::TUNING;
 use alloc::vec;
 use alloc::vec::Vec;
 use serde::{Deserialize, Serialize};
@@ -54,26 +53,25 @@ impl OpenLoop {
 
     /// What the model says the outputs are now (p).
     ///
-    /// It feeds on no estimate, so it can stand in for a silent sensor: the observer's own prediction
+    /// It feeds on no estimate, so it can replace a missing reading: the observer's own prediction
     /// in that place would make another observer, of which nothing was proved.
     pub fn output(&self, mode: &ObservedMode, out: &mut [f64]) {
         mode.output(out, &self.state);
     }
 
     /// Replaces the `corrected` readings (p) of sensors whose estimate is `held` (p) and that differ
-    /// from what is `expected` of them (p) by more than their `thresholds` (p) allow.
+    /// from what is `expected` of them (p) by more than `most` times their `thresholds` (p).
     pub fn overrule(
         &mut self,
         expected: &[f64],
         held: impl Iterator<Item = bool>,
-        thresholds: &[f64],
+        (most, thresholds): (f64, &[f64]),
         corrected: &mut [f64],
     ) {
         let sensors = held.zip(thresholds).zip(expected);
         let readings = corrected.iter_mut().zip(&mut self.contradicted);
         for ((reading, contradicted), ((held, &threshold), &modelled)) in readings.zip(sensors) {
-            *contradicted =
-                held && (*reading - modelled).abs() > TUNING.open_loop_thresholds * threshold;
+            *contradicted = held && (*reading - modelled).abs() > most * threshold;
             if *contradicted {
                 *reading = modelled;
             }

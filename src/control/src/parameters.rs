@@ -1,6 +1,7 @@
 //! Everything the controller needs to know before its first tick: plain, serialisable data.
 
 use crate::matrix::{Matrix, upper_triangle};
+use crate::tuning::Tuning;
 use alloc::string::String;
 use alloc::vec;
 use alloc::vec::Vec;
@@ -311,7 +312,7 @@ pub struct Estimator {
     pub window: usize,
     /// The predictor of each mode; none for the other methods.
     pub predictors: Vec<Predictor>,
-    /// Whether the response goes on being learned while all is well.
+    /// Whether the response goes on being learned from healthy samples.
     #[serde(default)]
     pub adapt: bool,
     /// The periodic disturbance whose response is learned on line.
@@ -330,6 +331,8 @@ pub struct Estimator {
     pub leverage_limit: f64,
     /// Largest magnitude an estimate may take, per sensor (p).
     pub largest_fault: Vec<f64>,
+    /// Tuning constants of the on-line path.
+    pub tuning: Tuning,
 }
 
 /// Leverage beyond which a residual is not used, where nothing else is asked for.
@@ -356,6 +359,7 @@ impl Estimator {
             stuck_after: 0,
             leverage_limit: LEVERAGE_LIMIT,
             largest_fault: vec![f64::MAX; outputs],
+            tuning: Tuning::default(),
         }
     }
 
@@ -435,8 +439,9 @@ pub struct Hypotheses {
     pub period_error: f64,
     /// Standard deviation of each state of the disturbance (2 x harmonics x s).
     pub disturbance_size: Vec<f64>,
-    /// Angle per sample of each harmonic, in radians; empty without a known period.
-    pub angles: Vec<f64>,
+    /// The disturbance's period, if it is known.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub period: Option<KnownPeriod>,
     /// Typical deviation of each state from its operating point (n).
     pub state_size: Vec<f64>,
     /// Standard deviation of the state at the start (n).
@@ -450,6 +455,24 @@ pub struct Hypotheses {
     /// What logs say of each mode in place of the plant's matrices; empty without logs.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub fitted: Vec<FittedMode>,
+}
+
+/// The period of a disturbance.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[expect(clippy::exhaustive_structs, reason = "a period and its harmonics")]
+pub struct KnownPeriod {
+    /// Period in seconds.
+    pub seconds: f64,
+    /// Harmonics, the fundamental included.
+    pub harmonics: usize,
+}
+
+impl KnownPeriod {
+    /// Angle per sample (radians) of each harmonic.
+    pub fn angles(self, sample_time: f64) -> impl Iterator<Item = f64> + Clone {
+        let fundamental = core::f64::consts::TAU * sample_time / self.seconds;
+        (1..=self.harmonics).map(move |harmonic| harmonic as f64 * fundamental)
+    }
 }
 
 /// A mode's matrices as logs of healthy operation have them, about the plant's operating point.

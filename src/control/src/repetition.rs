@@ -8,8 +8,8 @@ use alloc::vec;
 use alloc::vec::Vec;
 use serde::{Deserialize, Serialize};
 
-/// What a silent sensor says: no measurement, yet equal to itself.
-const SILENCE: f64 = f64::INFINITY;
+/// Stands for the reading of a sensor without one: no measurement, yet equal to itself.
+const NO_READING: f64 = f64::INFINITY;
 
 /// How often each sensor has repeated itself.
 #[derive(Debug, PartialEq, Serialize, Deserialize)]
@@ -18,7 +18,7 @@ pub struct Repetition {
     last: Vec<f64>,
     /// How many times in a row it has been repeated (p).
     repeats: Vec<u32>,
-    /// The readings, infinite where a sensor is silent or frozen (p).
+    /// The readings, infinite where a sensor gives none or is frozen (p).
     screened: Vec<f64>,
     /// Whether the coming readings are held ones, whose repetition means nothing.
     held: bool,
@@ -34,9 +34,9 @@ impl Repetition {
     /// Nothing seen of any of the `outputs` sensors.
     pub fn new(outputs: usize) -> Self {
         Self {
-            last: vec![SILENCE; outputs],
+            last: vec![NO_READING; outputs],
             repeats: vec![0; outputs],
-            screened: vec![SILENCE; outputs],
+            screened: vec![NO_READING; outputs],
             held: false,
         }
     }
@@ -50,7 +50,7 @@ impl Repetition {
             let reading = if is_measurement(given) {
                 given
             } else {
-                SILENCE
+                NO_READING
             };
             let repeated = reading == *last;
             *repeats = match (repeated, held) {
@@ -60,7 +60,7 @@ impl Repetition {
             };
             *last = reading;
             let frozen = limit > 0 && *repeats >= limit;
-            *out = if frozen { SILENCE } else { reading };
+            *out = if frozen { NO_READING } else { reading };
         }
         &self.screened
     }
@@ -70,7 +70,7 @@ impl Repetition {
         self.held = true;
     }
 
-    /// The readings of the last sample (p), infinite where a sensor is silent or frozen.
+    /// The readings of the last sample (p), infinite where a sensor gives none or is frozen.
     pub fn screened(&self) -> &[f64] {
         &self.screened
     }
@@ -84,7 +84,7 @@ mod tests {
         let mut repetition = Repetition::new(1);
         let screened = readings
             .iter()
-            .map(|&value| repetition.screen(&[value], limit)[0] == SILENCE);
+            .map(|&value| repetition.screen(&[value], limit)[0] == NO_READING);
         screened.collect()
     }
 

@@ -84,7 +84,7 @@ pub struct EstimatorSpec {
     pub debounce: u32,
     /// Repetitions of the very same reading after which a sensor is taken for frozen; 0: never.
     pub stuck_after: u32,
-    /// Whether the response goes on being learned while all is well.
+    /// Whether the response goes on being learned from healthy samples.
     pub adapt: bool,
     /// The periodic disturbance to be learned on line.
     pub disturbance: Option<KnownDisturbance>,

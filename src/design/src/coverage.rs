@@ -17,6 +17,7 @@ use ftc_control::parameters::{
     Estimator, EstimatorMethod, FeedbackGains, LEVERAGE_LIMIT, MOST_HARMONICS, ObserverKind,
     Predictor,
 };
+use ftc_control::tuning::Tuning;
 use ftc_plant::scaling::Scaling;
 use nalgebra::DMatrix;
 
@@ -270,6 +271,10 @@ fn check_estimator(design: &Design) -> Result<(), CoverageError> {
             "the limit of the leverage",
         ),
         (
+            estimator.tuning == Tuning::default(),
+            "a tuning constant of the estimator",
+        ),
+        (
             estimator
                 .predictors
                 .iter()
@@ -301,18 +306,15 @@ fn hypotheses_fit(design: &Design) -> bool {
         authority: Some(found.authority.clone()),
         input_load: Some(found.input_load.clone()),
     };
-    let known = found.angles.first().map(|&angle| KnownDisturbance {
-        period: core::f64::consts::TAU * plant.sample_time / angle,
-        harmonics: found.angles.len(),
+    let known = found.period.map(|known| KnownDisturbance {
+        period: known.seconds,
+        harmonics: known.harmonics,
         amplitude: Some(found.disturbance_load.clone()),
     });
     let noise = derived::sensor_noise(&design.scenario.noise, &estimator.thresholds);
     let tracked = &design.controller.feedback.tracked;
     let reach = hypotheses::reach(plant, tracked, &design.scenario);
     let mut derived = spec.settings(plant, &design.signals, noise, &reach, known.as_ref());
-    let turns = derived.angles.iter().zip(&found.angles);
-    let same_turns = turns.clone().all(|(a, b)| (a - b).abs() <= 1e-12 * a.abs());
-    derived.angles.clone_from(&found.angles);
     derived.release_rate = found.release_rate;
     derived.mode_rate = found.mode_rate;
     derived.fitted.clone_from(&found.fitted);
@@ -322,7 +324,7 @@ fn hypotheses_fit(design: &Design) -> bool {
         && found
             .mode_rate
             .is_none_or(|rate| (1e-9..=0.5).contains(&rate));
-    same_turns && chosen && derived == *found
+    chosen && derived == *found
 }
 
 /// Of a size that its signals can have, a regular triangular factor, deviations that are none or positive.

@@ -6,7 +6,7 @@ use crate::feedforward;
 use crate::matrices::{dense, plain};
 use crate::running_loop::{TRANSFER_DECAY, TransferCertificate};
 use ftc_control::parameters::{Limits, StateFeedback, Transfer};
-use ftc_control::tuning::TUNING;
+use ftc_control::tuning::DatabaseTuning;
 use ftc_plant::SwitchedPlant;
 
 /// Noise that the state-based estimator assumes at least, relative to the threshold.
@@ -52,11 +52,12 @@ pub fn feedback(
 /// Standard deviation of each sensor's noise (p) for the state-based estimator: that of the scenario, and
 /// never below what the smallest threshold stands for.
 pub(crate) fn sensor_noise(given: &[f64], thresholds: &[f64]) -> Vec<f64> {
+    let deviations = DatabaseTuning::default().threshold_deviations;
     let sensors = given.iter().zip(thresholds);
     sensors
         .map(|(&noise, &threshold)| match noise > 0.0 {
             true => noise.max(SMALLEST_NOISE * threshold),
-            false => threshold / TUNING.threshold_deviations,
+            false => threshold / deviations,
         })
         .collect()
 }

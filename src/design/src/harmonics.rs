@@ -8,7 +8,7 @@
 use super::matrices::plain;
 use super::units::power_of_two;
 use core::f64::consts::TAU;
-use ftc_control::parameters::PhasorMap;
+use ftc_control::parameters::{KnownPeriod, PhasorMap};
 use ftc_plant::{Mode, SwitchedPlant};
 use nalgebra::{Complex, DMatrix, DVector};
 
@@ -36,10 +36,11 @@ impl KnownDisturbance {
 
     /// Angle per sample (radians) of each harmonic, for [`ControlSpec::resonators`](crate::ControlSpec::resonators).
     pub fn angles(&self, sample_time: f64) -> Vec<f64> {
-        let fundamental = core::f64::consts::TAU * sample_time / self.period;
-        (1..=self.harmonics)
-            .map(|harmonic| harmonic as f64 * fundamental)
-            .collect()
+        let period = KnownPeriod {
+            seconds: self.period,
+            harmonics: self.harmonics,
+        };
+        period.angles(sample_time).collect()
     }
 }
 

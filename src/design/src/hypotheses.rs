@@ -2,7 +2,7 @@
 
 use crate::harmonics::KnownDisturbance;
 use crate::{Signal, Signals};
-use ftc_control::parameters::{Ambiguous, Hypotheses};
+use ftc_control::parameters::{Ambiguous, Hypotheses, KnownPeriod};
 use ftc_plant::{Mode, Scenario, SwitchedPlant};
 
 /// What may be asked of the state-based estimator; the rest follows from the design.
@@ -104,10 +104,14 @@ impl HypothesesSpec {
             .and_then(|known| known.amplitude.clone())
             .filter(|sizes| sizes.iter().all(|&size| size > 0.0));
         let disturbance = amplitude.unwrap_or_else(|| unknown_disturbance(plant, &scaling.outputs));
-        let angles = known.map_or_else(Vec::new, |known| known.angles(plant.sample_time));
+        let period = known.map(|known| KnownPeriod {
+            seconds: known.period,
+            harmonics: known.harmonics,
+        });
+        let harmonics = period.map_or(0, |known| known.harmonics);
         let waves = disturbance
             .iter()
-            .flat_map(|&size| vec![size; 2 * angles.len()]);
+            .flat_map(|&size| vec![size; 2 * harmonics]);
         Hypotheses {
             noise,
             fault_rate: self.fault_rate,
@@ -134,7 +138,7 @@ impl HypothesesSpec {
             gain_error: GAIN_ERROR,
             gain_walk: GAIN_WALK,
             period_error: PERIOD_ERROR,
-            angles,
+            period,
             start: scaled(&scaling.states, START),
             start_elsewhere: scaling.states.clone(),
             state_size: scaling.states,

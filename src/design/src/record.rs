@@ -14,7 +14,7 @@ use ftc_plant::{Scenario, TruePlant};
 use serde::{Deserialize, Serialize};
 
 /// Version of the record's layout; an FMU refuses a record of another.
-pub const FORMAT: u32 = 4;
+pub const FORMAT: u32 = 5;
 
 /// A finished design.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]

@@ -290,6 +290,9 @@ fn what_decides_the_command_is_derived_again() {
         d.controller.estimator.largest_fault[0] = 0.0
     });
     refused("leverage", &|d| d.controller.estimator.leverage_limit = 0.0);
+    refused("tuning constant", &|d| {
+        d.controller.estimator.tuning.bank.displaced *= 2.0
+    });
     refused("lost sensors", &|d| {
         d.controller.observer.minimum_dwell += 1;
     });

@@ -1,4 +1,4 @@
-//! Gated adaptation of the response: the database goes on growing while all is well.
+//! Gated adaptation of the response: the database goes on growing with healthy samples.
 //!
 //! Recursive least squares without forgetting continues the fit of the database with healthy
 //! samples, so it starts from everything the database knows and moves the less the more it has
@@ -9,7 +9,7 @@
 //!   grows below its threshold would be followed, and never declared;
 //! * it learns only from samples in which every sensor was judged healthy and the database's error
 //!   was small: a few noise deviations, and a share of what is predicted. A plant that changed errs
-//!   in proportion to what it does; a fault that hides does not;
+//!   in proportion to what it does; a fault below its threshold does not;
 //! * what it adds to a prediction keeps within the same bounds, whatever it has learned;
 //! * it is used, sensor by sensor, only while its predictions have been better than those of the
 //!   database alone, both judged before learning from the sample.
@@ -18,7 +18,7 @@ use super::least_squares::LeastSquares;
 use crate::kernel;
 use crate::matrix::Matrix;
 use crate::parameters::Predictor;
-use crate::tuning::TUNING;
+use crate::tuning::DatabaseTuning;
 use alloc::vec;
 use alloc::vec::Vec;
 use serde::{Deserialize, Serialize};
@@ -65,6 +65,7 @@ impl Adaptation {
         regressor: &[f64],
         y0: &[f64],
         prediction: &[f64],
+        tuning: &DatabaseTuning,
     ) {
         let changes = self.change.responses(regressor);
         for (addition, change) in self.addition.iter_mut().zip(changes) {
@@ -73,20 +74,20 @@ impl Adaptation {
         let outputs = prediction.iter().zip(y0).zip(&predictor.deviation);
         for (bound, ((value, centre), deviation)) in self.bound.iter_mut().zip(outputs) {
             *bound = kernel::bounded(
-                TUNING.adaptation_change * (value - centre).abs()
-                    + TUNING.adaptation_deviations * deviation,
+                tuning.adaptation_change * (value - centre).abs()
+                    + tuning.adaptation_deviations * deviation,
             );
         }
     }
 
     /// What to add to the database's prediction of each sensor (p): nothing where that did not prove better.
-    pub fn additions(&self) -> impl Iterator<Item = f64> {
+    pub fn additions(&self, tuning: &DatabaseTuning) -> impl Iterator<Item = f64> {
         let scores = self.fixed_error.iter().zip(&self.adapted_error);
         let additions = self.addition.iter().zip(&self.bound);
         additions
             .zip(scores)
             .map(|((&addition, &bound), (&fixed, &adapted))| {
-                if adapted < TUNING.adaptation_advantage * fixed {
+                if adapted < tuning.adaptation_advantage * fixed {
                     addition.clamp(-bound, bound)
                 } else {
                     0.0
@@ -96,17 +97,18 @@ impl Adaptation {
 
     /// Learns from a healthy sample, the one last [predicted](Self::predict). `error` (p) is that of the
     /// database's prediction.
-    pub fn learn(&mut self, regressor: &[f64], error: &[f64]) {
+    pub fn learn(&mut self, regressor: &[f64], error: &[f64], tuning: &DatabaseTuning) {
         let plausible = |(error, bound): (&f64, &f64)| error.abs() <= *bound;
         if !error.iter().zip(&self.bound).all(plausible) {
             return;
         }
+        let memory = tuning.adaptation_memory;
         let scores = self.fixed_error.iter_mut().zip(&mut self.adapted_error);
         let additions = self.addition.iter().zip(&self.bound);
         let mut left = error.iter().zip(additions).zip(scores).map(
             |((&error, (&addition, &bound)), (fixed, adapted))| {
-                update_mean(fixed, error);
-                update_mean(adapted, error - addition.clamp(-bound, bound));
+                update_mean(fixed, error, memory);
+                update_mean(adapted, error - addition.clamp(-bound, bound), memory);
                 error - addition
             },
         );
@@ -118,10 +120,8 @@ impl Adaptation {
 }
 
 /// Takes an error into a running mean of squares.
-fn update_mean(mean: &mut f64, error: f64) {
-    *mean = kernel::bounded(
-        TUNING.adaptation_memory * *mean + (1.0 - TUNING.adaptation_memory) * error * error,
-    );
+fn update_mean(mean: &mut f64, error: f64, memory: f64) {
+    *mean = kernel::bounded(memory * *mean + (1.0 - memory) * error * error);
 }
 
 /// `(R'R)^-1`, row after row: what the database leaves open.
@@ -180,15 +180,16 @@ mod tests {
 
     /// Feeds a plant with another response than the database's; returns the last prediction errors.
     fn adapt(truth: &[f64], known: &Predictor, ticks: u32) -> (f64, f64) {
+        let tuning = DatabaseTuning::default();
         let mut adaptation = Adaptation::new(known);
         let mut last = (0.0, 0.0);
         for k in 0..ticks {
             let phi = [f64::from(k).sin(), f64::from(2 * k).cos()];
             let fixed = kernel::dot(known.response.as_slice(), &phi);
-            adaptation.predict(known, &phi, &[0.0], &[fixed]);
+            adaptation.predict(known, &phi, &[0.0], &[fixed], &tuning);
             let error = kernel::dot(truth, &phi) - fixed;
-            last = (error, error - adaptation.additions().sum::<f64>());
-            adaptation.learn(&phi, &[error]);
+            last = (error, error - adaptation.additions(&tuning).sum::<f64>());
+            adaptation.learn(&phi, &[error], &tuning);
         }
         last
     }
@@ -223,14 +224,15 @@ mod tests {
     #[test]
     fn a_fault_that_grows_unseen_is_not_followed() {
         let known = predictor(&[1.0, 0.5], 10.0);
+        let tuning = DatabaseTuning::default();
         let mut adaptation = Adaptation::new(&known);
         for k in 0..4000 {
             let phi = [1.0, 0.2];
-            adaptation.predict(&known, &phi, &[0.0], &[1.1]);
-            adaptation.learn(&phi, &[1e-3 * f64::from(k)]);
-            let added: f64 = adaptation.additions().sum();
+            adaptation.predict(&known, &phi, &[0.0], &[1.1], &tuning);
+            adaptation.learn(&phi, &[1e-3 * f64::from(k)], &tuning);
+            let added: f64 = adaptation.additions(&tuning).sum();
             assert!(
-                added <= TUNING.adaptation_change * 1.1 + TUNING.adaptation_deviations * 0.01,
+                added <= tuning.adaptation_change * 1.1 + tuning.adaptation_deviations * 0.01,
                 "{added} at {k}"
             );
         }

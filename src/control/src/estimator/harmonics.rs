@@ -8,7 +8,7 @@
 use super::least_squares::LeastSquares;
 use crate::kernel;
 use crate::parameters::{Harmonics, PhasorMap};
-use crate::tuning::TUNING;
+use crate::tuning::DatabaseTuning;
 use alloc::vec;
 use alloc::vec::Vec;
 use serde::{Deserialize, Serialize};
@@ -83,8 +83,8 @@ impl HarmonicState {
     }
 
     /// Whether enough was learned to say something of another mode.
-    pub fn is_known(&self) -> bool {
-        self.samples >= TUNING.samples_per_coefficient * self.regressor.len() as u64
+    pub fn is_known(&self, tuning: &DatabaseTuning) -> bool {
+        self.samples as f64 >= tuning.samples_per_coefficient * self.regressor.len() as f64
     }
 
     /// Whether a whole period has been learned from.
@@ -98,6 +98,7 @@ impl HarmonicState {
         other: &Self,
         maps: &[PhasorMap],
         deviations: impl Iterator<Item = f64> + Clone,
+        tuning: &DatabaseTuning,
     ) {
         let size = self.regressor.len().max(1);
         let moved = |coefficients: &mut [f64]| {
@@ -121,7 +122,7 @@ impl HarmonicState {
         let variance = |fit: &LeastSquares| {
             let rows = fit.rows().zip(deviations);
             let relative = rows.map(|(row, deviation)| {
-                TUNING.transfer_error * libm::sqrt(kernel::dot(row, row)) / deviation
+                tuning.transfer_error * libm::sqrt(kernel::dot(row, row)) / deviation
             });
             let largest = relative.fold(0.0, f64::max);
             largest * largest

@@ -2,7 +2,7 @@
 //!
 //! A healthy database of inputs `U1` and outputs `Y1` fixes, by projection, what the output must
 //! be: `y_hat = y0 + Y1 U1^+ phi` (`predictor`). What the periodic disturbance adds is learned
-//! on line while all is well (`harmonics`). The residual is what remains; each sensor's residual
+//! on line while no sensor is flagged (`harmonics`). The residual is what remains; each sensor's residual
 //! is judged against its own threshold (`decision`), widened by how far the present input lies
 //! from those the database knows.
 
@@ -17,7 +17,6 @@ mod predictor;
 mod recovery;
 mod window;
 
-use crate::tuning::TUNING;
 pub use adaptation::Adaptation;
 use alloc::vec;
 use alloc::vec::Vec;
@@ -151,7 +150,7 @@ impl EstimatorState {
             recovery: estimator
                 .harmonics
                 .as_ref()
-                .map(|h| Recovery::new(h, outputs)),
+                .map(|h| Recovery::new(h, outputs, &estimator.tuning.database)),
             adaptations: if estimator.adapt {
                 estimator.predictors.iter().map(Adaptation::new).collect()
             } else {
@@ -162,6 +161,7 @@ impl EstimatorState {
                     inputs.len() * estimator.response_length,
                     outputs,
                     estimator.window,
+                    estimator.tuning.database.window_rank,
                 )
             }),
             decisions: vec![Decision::default(); outputs],
@@ -181,6 +181,7 @@ impl EstimatorState {
         to: usize,
         thresholds: &[f64],
     ) {
+        let tuning = &estimator.tuning.database;
         self.hold = estimator.response_length;
         if let Some(window) = &mut self.window {
             window.clear();
@@ -191,13 +192,13 @@ impl EstimatorState {
             .and_then(|row| row.get(to));
         if let Some(maps) = maps
             && let Ok([left, entered]) = self.harmonics.get_disjoint_mut([from, to])
-            && left.is_known()
-            && !entered.is_known()
+            && left.is_known(tuning)
+            && !entered.is_known(tuning)
         {
             let deviations = thresholds
                 .iter()
-                .map(|t| (t / TUNING.threshold_deviations).max(f64::MIN_POSITIVE));
-            entered.carry_over(left, maps, deviations);
+                .map(|t| (t / tuning.threshold_deviations).max(f64::MIN_POSITIVE));
+            entered.carry_over(left, maps, deviations, tuning);
         }
     }
 
@@ -296,7 +297,7 @@ impl EstimatorState {
             ((addition, (prediction, residual)), (fault, (&flagged, &judged))),
             (&value, &largest),
         ) in adaptation
-            .additions()
+            .additions(&estimator.tuning.database)
             .zip(signals)
             .zip(estimates)
             .zip(limits)
@@ -316,6 +317,7 @@ impl EstimatorState {
     fn predict(&mut self, estimator: &Estimator, seen: &Observation<'_>) -> Option<Validity> {
         self.judged.fill(false);
         let predictor = estimator.predictors.get(seen.mode)?;
+        let tuning = &estimator.tuning.database;
         kernel::affine(
             &mut self.prediction,
             seen.y0,
@@ -324,7 +326,7 @@ impl EstimatorState {
         );
         if let Some(adaptation) = self.adaptations.get_mut(seen.mode) {
             let regressor = self.history.regressor();
-            adaptation.predict(predictor, regressor, seen.y0, &self.prediction);
+            adaptation.predict(predictor, regressor, seen.y0, &self.prediction, tuning);
         }
         let leverage = self.history.leverage(&predictor.factor);
         let mut spread = 1.0 + leverage;
@@ -350,7 +352,7 @@ impl EstimatorState {
             .zip(&predictor.deviation);
         for (judged, ((&predicted, &y0), deviation)) in self.judged.iter_mut().zip(signals) {
             let precise = libm::sqrt(leverage) * deviation
-                <= TUNING.extrapolation_error * (predicted - y0).abs();
+                <= tuning.extrapolation_error * (predicted - y0).abs();
             *judged = self.hold == 0 && (spanned || precise);
         }
         let most = 1.0 + estimator.leverage_limit;
@@ -373,7 +375,11 @@ impl EstimatorState {
             learned.learn(known, &self.residual);
         }
         if settled && let Some(adaptation) = self.adaptations.get_mut(mode) {
-            adaptation.learn(self.history.regressor(), &self.residual);
+            adaptation.learn(
+                self.history.regressor(),
+                &self.residual,
+                &estimator.tuning.database,
+            );
         }
     }
 
@@ -387,7 +393,7 @@ impl EstimatorState {
             return false;
         };
         if self.hold > 0 || !seen.y.iter().all(|&value| is_measurement(value)) {
-            recovery.restart();
+            recovery.restart(&estimator.tuning.database);
             return false;
         }
         let unexplained = self
@@ -400,14 +406,15 @@ impl EstimatorState {
             return false;
         }
         let settled = learned.is_settled(known);
+        let share = estimator.tuning.database.recovery_share;
         let mut corrected = false;
         for (sensor, &threshold) in seen.thresholds.iter().enumerate() {
-            if let Some(waves) = recovery.explanation(sensor, threshold, settled) {
+            if let Some(waves) = recovery.explanation(sensor, share * threshold, settled) {
                 learned.replace(sensor, waves);
                 corrected = true;
             }
         }
-        recovery.restart();
+        recovery.restart(&estimator.tuning.database);
         corrected
     }
 
@@ -426,13 +433,14 @@ impl EstimatorState {
     }
 
     /// Decides sensor by sensor; `validity` is absent when the residual means nothing now.
-    /// Returns whether the residual was judged and every sensor found healthy beyond suspicion.
+    /// Returns whether the residual was judged and no sensor is flagged and every residual is small.
     fn decide(
         &mut self,
         estimator: &Estimator,
         seen: &Observation<'_>,
         validity: Option<Validity>,
     ) -> bool {
+        let learning_share = estimator.tuning.database.learning_share;
         let mut healthy = validity.is_some_and(|validity| validity.informs);
         let sensors = self
             .decisions
@@ -461,8 +469,8 @@ impl EstimatorState {
                 (true, Verdict::Lost) => *fault,
                 (true, _) => residual.clamp(-largest, largest),
             };
-            let quiet = validity
-                .is_some_and(|t| residual.abs() <= TUNING.learning_share * t.widening * threshold);
+            let quiet =
+                validity.is_some_and(|t| residual.abs() <= learning_share * t.widening * threshold);
             healthy &= !*flagged && verdict == Verdict::Healthy && quiet;
         }
         healthy

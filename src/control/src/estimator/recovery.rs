@@ -10,7 +10,7 @@
 use super::least_squares::LeastSquares;
 use crate::kernel;
 use crate::parameters::Harmonics;
-use crate::tuning::TUNING;
+use crate::tuning::DatabaseTuning;
 use alloc::vec;
 use alloc::vec::Vec;
 use serde::{Deserialize, Serialize};
@@ -36,10 +36,10 @@ crate::state!(Recovery {
 
 impl Recovery {
     /// Nothing seen yet.
-    pub fn new(harmonics: &Harmonics, outputs: usize) -> Self {
+    pub fn new(harmonics: &Harmonics, outputs: usize, tuning: &DatabaseTuning) -> Self {
         let size = 1 + 2 * harmonics.count;
         Self {
-            fit: LeastSquares::with_variance(outputs, size, TUNING.recovery_variance),
+            fit: LeastSquares::with_variance(outputs, size, tuning.recovery_variance),
             regressor: vec![0.0; size],
             unexplained: vec![0.0; outputs],
             was_flagged: vec![false; outputs],
@@ -48,8 +48,8 @@ impl Recovery {
     }
 
     /// Drops the period begun.
-    pub fn restart(&mut self) {
-        self.fit.restart(TUNING.recovery_variance);
+    pub fn restart(&mut self, tuning: &DatabaseTuning) {
+        self.fit.restart(tuning.recovery_variance);
         self.unexplained.fill(0.0);
         self.was_flagged.fill(false);
         self.samples = 0;
@@ -86,12 +86,11 @@ impl Recovery {
         self.samples as f64 >= harmonics.period
     }
 
-    /// The harmonics (q) that explain all that was seen of `sensor`, if it was called faulty and they do.
-    /// Where the disturbance was not `settled` yet, a constant fault may be left beside them.
-    pub fn explanation(&self, sensor: usize, threshold: f64, settled: bool) -> Option<&[f64]> {
+    /// The harmonics (q) that explain all that was seen of `sensor` up to `limit` (output units), if it was called
+    /// faulty and they do. Where the disturbance was not `settled` yet, a constant fault may be left beside them.
+    pub fn explanation(&self, sensor: usize, limit: f64, settled: bool) -> Option<&[f64]> {
         let (constant, waves) = self.fit.rows().nth(sensor)?.split_first()?;
         let mean_square = self.unexplained.get(sensor)? / self.samples.max(1) as f64;
-        let limit = TUNING.recovery_share * threshold;
         let no_bias = constant.abs() <= limit || !settled;
         let explained = mean_square <= limit * limit;
         (no_bias && explained && *self.was_flagged.get(sensor)?).then_some(waves)
@@ -111,7 +110,7 @@ mod tests {
     };
 
     fn watch(residual: impl Fn(f64) -> f64) -> Recovery {
-        let mut recovery = Recovery::new(&KNOWN, 1);
+        let mut recovery = Recovery::new(&KNOWN, 1, &DatabaseTuning::default());
         let mut waves = HarmonicState::new(&KNOWN, 1);
         for k in 0..50 {
             waves.rotate(&KNOWN, k);
@@ -125,7 +124,7 @@ mod tests {
     #[test]
     fn a_wrong_response_is_recognised() {
         let recovery = watch(|k| 0.4 * (core::f64::consts::TAU * k / 50.0 + 1.0).sin());
-        let waves = recovery.explanation(0, 0.1, true).unwrap();
+        let waves = recovery.explanation(0, 0.05, true).unwrap();
         assert!(
             (waves[0] - 0.4 * 1f64.cos()).abs() < 1e-5
                 && (waves[1] - 0.4 * 1f64.sin()).abs() < 1e-5
@@ -136,22 +135,22 @@ mod tests {
     #[test]
     fn a_bias_beside_an_unknown_disturbance_is_left() {
         let recovery = watch(|k| 0.5 + 0.4 * (core::f64::consts::TAU * k / 50.0).sin());
-        assert!(recovery.explanation(0, 0.1, true).is_none());
-        let waves = recovery.explanation(0, 0.1, false).unwrap();
+        assert!(recovery.explanation(0, 0.05, true).is_none());
+        let waves = recovery.explanation(0, 0.05, false).unwrap();
         assert!((waves[0] - 0.4).abs() < 1e-5 && waves[1].abs() < 1e-5);
     }
 
     #[test]
     fn a_fault_is_not_explained_away() {
-        assert!(watch(|_| 0.4).explanation(0, 0.1, true).is_none());
+        assert!(watch(|_| 0.4).explanation(0, 0.05, true).is_none());
         assert!(
             watch(|k| 0.01 * k - 0.25)
-                .explanation(0, 0.1, true)
+                .explanation(0, 0.05, true)
                 .is_none()
         );
         assert!(
             watch(|k| if k < 25.0 { 0.4 } else { -0.4 })
-                .explanation(0, 0.1, true)
+                .explanation(0, 0.05, true)
                 .is_none()
         );
     }

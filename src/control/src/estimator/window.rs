@@ -9,7 +9,6 @@
 //! residual once it fills the window.
 
 use crate::kernel;
-use crate::tuning::TUNING;
 use alloc::vec;
 use alloc::vec::Vec;
 use serde::{Deserialize, Serialize};
@@ -26,19 +25,22 @@ pub struct SlidingWindow {
     /// `Pi e_L` (L).
     projection: Vec<f64>,
     length: usize,
+    /// Length of a direction over the longest row below which it counts as none.
+    rank: f64,
     /// Samples taken so far, at most `L`.
     filled: usize,
 }
 
 crate::state!(SlidingWindow {
     parts: [inputs, outputs, basis, projection],
-    constants: [length],
+    constants: [length, rank],
     counters: [filled]
 });
 
 impl SlidingWindow {
-    /// An empty window of `length` samples of a regressor of size `regressor` and `outputs` sensors.
-    pub fn new(regressor: usize, outputs: usize, length: usize) -> Self {
+    /// An empty window of `length` samples of a regressor of size `regressor` and `outputs` sensors; a direction shorter than
+    /// `rank` times the longest row counts as none.
+    pub fn new(regressor: usize, outputs: usize, length: usize, rank: f64) -> Self {
         let length = length.max(1);
         Self {
             inputs: vec![0.0; regressor * length],
@@ -46,6 +48,7 @@ impl SlidingWindow {
             basis: vec![0.0; regressor * length],
             projection: vec![0.0; length],
             length,
+            rank,
             filled: 0,
         }
     }
@@ -94,7 +97,7 @@ impl SlidingWindow {
                 break;
             };
             if done == 0 {
-                floor = TUNING.window_rank * TUNING.window_rank * square;
+                floor = self.rank * self.rank * square;
             }
             if square <= floor {
                 break;
@@ -171,7 +174,7 @@ mod tests {
     /// A step of 0.5 under constant input, `L = 46`: seen at first, absorbed as the window fills.
     #[test]
     fn a_fault_that_stays_is_absorbed() {
-        let mut window = SlidingWindow::new(24, 1, 46);
+        let mut window = SlidingWindow::new(24, 1, 46, 1e-9);
         let mut seen = Vec::new();
         for k in 0..150 {
             let mut out = [0.0];
@@ -195,7 +198,7 @@ mod tests {
             prop_assume!(gram.clone().symmetric_eigen().eigenvalues.min() > 1e-2);
             let projector = DMatrix::identity(12, 12) - u.transpose() * gram.try_inverse().unwrap() * &u;
             let expected = (DMatrix::from_row_slice(1, 12, &y) * projector)[(0, 11)];
-            let mut window = SlidingWindow::new(4, 1, 12);
+            let mut window = SlidingWindow::new(4, 1, 12, 1e-9);
             let mut out = [0.0];
             for (column, y) in u.column_iter().zip(y) {
                 let column: Vec<f64> = column.iter().copied().collect();

@@ -4,6 +4,7 @@ use super::CHANNELS;
 use crate::{Error, experiment};
 use ftc_control::estimator::SlidingWindow;
 use ftc_control::parameters::FeedbackGains;
+use ftc_control::tuning::DatabaseTuning;
 use ftc_design::as_printed::{PrintedVerdict, theorem_1, theorem_2};
 use ftc_design::assembly::Request;
 use ftc_design::{ControlSpec, DesignError, Lyapunov, StateFeedback, dense, state_feedback};
@@ -55,7 +56,8 @@ pub fn absorption() -> Absorption {
     const REGRESSOR: usize = 2 * 12;
     const WINDOW: usize = 46;
     const LATER: usize = 20;
-    let mut window = SlidingWindow::new(REGRESSOR, 1, WINDOW);
+    let rank = DatabaseTuning::default().window_rank;
+    let mut window = SlidingWindow::new(REGRESSOR, 1, WINDOW, rank);
     let mut residual = |fault: f64| {
         let mut out = [0.0];
         window.residual(&[0.3; REGRESSOR], &[1.2 + fault], &mut out);

@@ -2,9 +2,8 @@
 
 use super::hypothesis::{Hypothesis, Kinds, Reading, Sensors, has};
 use super::model::{Layout, ModeModel};
-use super::own_run::OwnRun;
-use super::{Bank, BankState, Live};
-use crate::tuning::BANK;
+use super::model_run::ModelRun;
+use super::{Bank, BankState, SlotsInUse};
 use alloc::vec;
 use alloc::vec::Vec;
 use serde::{Deserialize, Serialize};
@@ -12,7 +11,7 @@ use serde::{Deserialize, Serialize};
 /// What may have happened since the last sample.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub(super) enum Action {
-    /// All goes on.
+    /// Nothing happened.
     Stay,
     /// Loads jump, and input gains with them: the number of the jump.
     Load(usize),
@@ -32,20 +31,20 @@ pub(super) enum Action {
     Freeze(usize),
     /// The plant was not at rest at the start.
     Start,
-    /// No load acts: the readings have come back to the model's own run.
-    Home,
+    /// No load acts: the readings have come back to the model in open loop.
+    Unloaded,
     /// No load acts but the usual ones: the readings have come back to the model's run under those.
-    Return,
-    /// No load acts: these sensors have drifted away from the model's own run.
+    UsualLoad,
+    /// No load acts: these sensors have drifted away from the model in open loop.
     Drift(Sensors),
 }
 
 impl Action {
-    /// Of the model's `own` run and that under the `usual` loads, the one to which it puts a hypothesis back.
-    pub(super) const fn run<'a>(self, own: &'a OwnRun, usual: &'a OwnRun) -> &'a OwnRun {
+    /// Of the model in open loop as `unloaded` and that under the `usual` loads, the one to which it puts a hypothesis back.
+    pub(super) const fn run<'a>(self, unloaded: &'a ModelRun, usual: &'a ModelRun) -> &'a ModelRun {
         match self {
-            Self::Return => usual,
-            _ => own,
+            Self::UsualLoad => usual,
+            _ => unloaded,
         }
     }
 }
@@ -108,7 +107,7 @@ impl Bank {
     /// Judges a sample that is not like the last.
     pub(super) fn compete(&self, state: &mut BankState, reading: Reading<'_>) {
         state.candidates.count = 0;
-        for slot in state.live.slots() {
+        for slot in state.in_use.slots() {
             self.propose(state, slot, self.model(state, slot), reading);
         }
         self.select(state);
@@ -144,7 +143,7 @@ impl Bank {
             Action::Stay | Action::Load(_) | Action::Loosen | Action::Tighten | Action::Start => {
                 now
             }
-            Action::Home | Action::Return => Kinds {
+            Action::Unloaded | Action::UsualLoad => Kinds {
                 additive: 0,
                 stuck: 0,
                 scaled: 0,
@@ -206,15 +205,15 @@ impl Bank {
             .map(|c| c.score)
             .fold(f64::NEG_INFINITY, f64::max);
         // What has fallen further than a new fault costs, and the odds of a sensor fault, is dropped.
-        let margin = self.settings.odds - self.prices.fault.min(self.prices.load);
+        let margin = self.settings.odds - self.log_rates.fault.min(self.log_rates.load);
         let mut kept = 0;
         let mut plain = false;
         for index in 0..state.candidates.count {
             let candidate = state.candidates.list[index];
             let kind = self.kind(state, &candidate);
             let unflagged = (kind.0, kind.1) == (0, false);
-            let room = BANK.kept - usize::from(!plain);
-            let stays = candidate.score >= best - margin && kept < room;
+            let most = self.tuning.kept as usize - usize::from(!plain);
+            let stays = candidate.score >= best - margin && kept < most;
             if !stays && (plain || !unflagged) {
                 continue;
             }
@@ -222,13 +221,14 @@ impl Bank {
                 .iter()
                 .filter(|c| self.kind(state, c) == kind && c.convinced == candidate.convinced)
                 .count();
-            if alike >= BANK.per_sensor_set || self.is_twin(state, &candidate, kept) {
+            if alike >= self.tuning.per_sensor_set as usize || self.is_twin(state, &candidate, kept)
+            {
                 continue;
             }
             plain |= unflagged;
             let mut taken = candidate;
-            taken.score =
-                (candidate.score - best).clamp(-BANK.unflagged_range, BANK.unflagged_range);
+            taken.score = (candidate.score - best)
+                .clamp(-self.tuning.unflagged_range, self.tuning.unflagged_range);
             state.candidates.list[kept] = taken;
             kept += 1;
         }
@@ -250,14 +250,14 @@ impl Bank {
             other.action == Action::Stay
                 && o.kinds() == h.kinds()
                 && (o.loose, o.convinced, o.mode) == (h.loose, h.convinced, h.mode)
-                && o.has_estimate(&h.z)
-                && state.seen[other.parent].leaves(&seen.r)
+                && o.has_estimate(&self.tuning, &h.z)
+                && state.seen[other.parent].leaves(&self.tuning, &seen.r)
         })
     }
 
     /// The candidates that stay become the hypotheses in competition.
     fn instantiate(&self, state: &mut BankState, reading: Reading<'_>) {
-        let mut next = Live::NONE;
+        let mut next = SlotsInUse::NONE;
         // Children first: they start from their parents' predictions.
         let mut free = 0;
         for index in 0..state.candidates.count {
@@ -266,7 +266,7 @@ impl Bank {
                 next.add(candidate.parent);
                 continue;
             }
-            while state.live.contains(free) || next.contains(free) {
+            while state.in_use.contains(free) || next.contains(free) {
                 free += 1;
             }
             next.add(free);
@@ -279,7 +279,7 @@ impl Bank {
         for index in 0..state.candidates.count {
             self.learn_from(state, usize::from(next.list[index]), index);
         }
-        state.live = next;
+        state.in_use = next;
         self.decide(state, reading);
     }
 
@@ -289,29 +289,30 @@ impl Bank {
         let h = &mut state.slots[slot];
         h.update(self.layout, &mut state.seen[slot], self.output_error());
         h.score = candidate.score;
-        let price = match candidate.action {
+        let log_rate = match candidate.action {
             Action::Stay | Action::Tighten | Action::Release(_) => 0.0,
             Action::Load(_) | Action::Loosen => 0.0,
             Action::Bias(_)
             | Action::Scale(_)
             | Action::Freeze(_)
             | Action::Start
-            | Action::Home
-            | Action::Return
-            | Action::Drift(_) => -2.0 * self.prices.fault,
-            Action::Change(_) => -2.0 * self.prices.change,
+            | Action::Unloaded
+            | Action::UsualLoad
+            | Action::Drift(_) => -2.0 * self.log_rates.fault,
+            Action::Change(_) => -2.0 * self.log_rates.change,
         };
-        h.misfit += BANK.misfit_share * (state.seen[slot].square.min(1e3) + price - h.misfit);
+        let square = state.seen[slot].square.min(self.tuning.misfit_limit);
+        h.misfit += self.tuning.misfit_share * (square + log_rate - h.misfit);
         h.convinced = candidate.convinced;
     }
 
     /// Which hypothesis is used: one with a sensor fault must beat the best one without by its odds.
     fn decide(&self, state: &mut BankState, reading: Reading<'_>) {
-        let (p, fault) = (self.layout.p, self.layout.fault());
+        let (p, fault, tuning) = (self.layout.p, self.layout.fault(), &self.tuning);
         let mode = self.decide_mode(state);
-        let mut best = state.live.first();
+        let mut best = state.in_use.first();
         let mut top = f64::NEG_INFINITY;
-        for slot in state.live.slots() {
+        for slot in state.in_use.slots() {
             let h = &state.slots[slot];
             let value = if h.flagged() == 0 || self.settings.trusts_model() {
                 h.score
@@ -319,8 +320,8 @@ impl Bank {
                 h.score - self.settings.odds
             };
             let fits = h.flagged() == 0
-                || h.misfit < 3.0 * p as f64 + 6.0
-                    && state.seen[slot].square < 20.0 + 4.0 * p as f64;
+                || h.misfit < tuning.misfit_of_fault(p)
+                    && state.seen[slot].square < tuning.square_of_fault(p);
             if h.convinced && fits && h.mode as usize == mode && value > top {
                 top = value;
                 best = slot;
@@ -329,20 +330,21 @@ impl Bank {
         state.best = best;
         state.suspect = 0;
         let decided = state.slots[best].flagged();
-        for slot in state.live.slots() {
+        for slot in state.in_use.slots() {
             let h = &state.slots[slot];
             if h.score < state.slots[best].score {
                 continue;
             }
             for q in 0..p {
                 if has(h.flagged() & !decided, q)
-                    && (!has(h.additive, q) || h.z[fault + q].abs() > 6.0 * reading.noise[q])
+                    && (!has(h.additive, q)
+                        || h.z[fault + q].abs() > tuning.suspect_deviations * reading.noise[q])
                 {
                     state.suspect |= 1 << q;
                 }
             }
         }
         // The best leads.
-        state.live.lead(best);
+        state.in_use.lead(best);
     }
 }

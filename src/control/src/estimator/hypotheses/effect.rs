@@ -3,9 +3,8 @@
 use super::competition::{Action, Candidate};
 use super::hypothesis::{Hypothesis, Reading, has};
 use super::model::ModeModel;
-use super::own_run::OwnRun;
+use super::model_run::ModelRun;
 use super::{Bank, BankState};
-use crate::tuning::BANK;
 
 impl Bank {
     /// The hypothesis in `slot` becomes what the candidate makes of its parent.
@@ -17,7 +16,7 @@ impl Bank {
         model: &ModeModel,
         reading: Reading<'_>,
     ) {
-        let (layout, settings) = (self.layout, &self.settings);
+        let (layout, settings, tuning) = (self.layout, &self.settings, &self.tuning);
         let (p, fault, stride) = (layout.p, layout.fault(), layout.stride());
         let (parent, child) = pair(&mut state.slots, candidate.parent, slot);
         child.take(parent);
@@ -47,18 +46,20 @@ impl Bank {
                 let variance = reading.noise[q] * reading.noise[q] / state.count[q].max(1.0);
                 child.open(fault + q, state.mean[q], variance);
             }
-            Action::Scale(q) => {
-                child.open(fault + q, BANK.gain_fault_mean, BANK.gain_fault_variance)
-            }
+            Action::Scale(q) => child.open(
+                fault + q,
+                tuning.gain_fault_mean,
+                tuning.gain_fault_variance,
+            ),
             Action::Start => {
                 for (k, sd) in settings.start_elsewhere.iter().enumerate() {
                     child.cov[k * stride + k] += sd * sd;
                 }
             }
-            Action::Home | Action::Return | Action::Drift(_) => {
-                let run = candidate.action.run(&state.own, &state.usual);
+            Action::Unloaded | Action::UsualLoad | Action::Drift(_) => {
+                let run = candidate.action.run(&state.unloaded, &state.usual);
                 for (k, &x) in run.x.iter().enumerate() {
-                    child.open(k, x, run.variance(model, settings, k));
+                    child.open(k, x, run.variance(model, settings, tuning, k));
                     child.before[k] = x;
                 }
                 self.reset_loads(child, model, run);
@@ -87,14 +88,14 @@ impl Bank {
     }
 
     /// Loads and errors of the input gains are those of the model's `run`.
-    fn reset_loads(&self, h: &mut Hypothesis, model: &ModeModel, run: &OwnRun) {
+    fn reset_loads(&self, h: &mut Hypothesis, model: &ModeModel, run: &ModelRun) {
         for (k, size) in model.load_size.iter().enumerate() {
             let k = self.layout.load() + k;
-            h.open(k, run.load(k), BANK.load_remainder * size * size);
+            h.open(k, run.load(k), self.tuning.load_remainder * size * size);
         }
         let gain = self.settings.gain_error;
         for k in self.layout.gain()..self.layout.fault() {
-            h.open(k, run.load(k), BANK.load_remainder * gain * gain);
+            h.open(k, run.load(k), self.tuning.load_remainder * gain * gain);
         }
     }
 

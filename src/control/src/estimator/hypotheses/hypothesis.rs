@@ -9,7 +9,7 @@ use super::linear::{
 use super::model::{Jump, Layout, ModeModel};
 use crate::kernel::bounded;
 use crate::parameters::Hypotheses as Settings;
-use crate::tuning::BANK;
+use crate::tuning::BankTuning;
 use alloc::vec;
 use alloc::vec::Vec;
 use serde::{Deserialize, Serialize};
@@ -51,7 +51,7 @@ pub struct Hypothesis {
     pub misfit: f64,
 }
 
-/// What a sample says under a hypothesis.
+/// The innovation of a sample under a hypothesis.
 #[derive(Debug, PartialEq, Serialize, Deserialize)]
 pub struct Innovation {
     /// `y - y_hat` (p).
@@ -69,7 +69,7 @@ pub struct Innovation {
     /// `r' S^-1 r`.
     pub square: f64,
     /// Whether the covariance could be factored.
-    pub sound: bool,
+    pub regular: bool,
 }
 
 /// One sample.
@@ -93,7 +93,7 @@ crate::state!(Hypothesis {
 crate::state!(Innovation {
     parts: [r, output, rows, s, weights, white],
     constants: [],
-    counters: [square, sound]
+    counters: [square, regular]
 });
 
 /// From one sample to the next, the same for every hypothesis.
@@ -102,6 +102,8 @@ pub struct Step<'a> {
     pub layout: Layout,
     pub model: &'a ModeModel,
     pub settings: &'a Settings,
+    /// Tuning constants.
+    pub tuning: &'a BankTuning,
     /// Noise deviation (p).
     pub noise: &'a [f64],
     /// Cosine and sine of the angle by which each pair of the disturbance turns.
@@ -127,7 +129,7 @@ impl Innovation {
             weights: vec![[1.0, 0.0]; p],
             white: vec![0.0; p],
             square: 0.0,
-            sound: true,
+            regular: true,
         }
     }
 
@@ -193,8 +195,8 @@ impl Innovation {
 
     /// Factors the covariance, whitens the innovation.
     pub fn whiten(&mut self, p: usize) {
-        self.sound = factor(&mut self.s, p);
-        if !self.sound {
+        self.regular = factor(&mut self.s, p);
+        if !self.regular {
             self.white.fill(0.0);
             self.square = 1e300;
             return;
@@ -208,18 +210,18 @@ impl Innovation {
     }
 
     /// Whether an innovation `r` (p) is about the same as this one, after [`whiten`](Self::whiten).
-    pub fn leaves(&self, r: &[f64]) -> bool {
+    pub fn leaves(&self, tuning: &BankTuning, r: &[f64]) -> bool {
         let p = r.len();
         self.r.iter().zip(r).enumerate().all(|(q, (own, other))| {
             let factor = &self.s[q * p..=q * p + q];
             let off = own - other;
-            off * off <= BANK.same_estimate * dot(factor, factor)
+            off * off <= tuning.same_estimate * dot(factor, factor)
         })
     }
 
     /// Logarithm of the likelihood, after [`whiten`](Self::whiten).
     pub fn likelihood(&self, p: usize) -> f64 {
-        if !self.sound {
+        if !self.regular {
             return -1e5;
         }
         let mut product = 1.0;
@@ -319,13 +321,13 @@ impl Hypothesis {
     }
 
     /// Whether an estimate `z` (N, padded) is about the same as this one.
-    pub fn has_estimate(&self, z: &[f64]) -> bool {
+    pub fn has_estimate(&self, tuning: &BankTuning, z: &[f64]) -> bool {
         let stride = self.z.len();
         let pairs = self.z.iter().zip(z);
         let mut variances = self.cov.iter().step_by(stride + 1);
         pairs.zip(&mut variances).all(|((own, other), variance)| {
             let off = own - other;
-            off * off <= BANK.same_estimate * variance
+            off * off <= tuning.same_estimate * variance
         })
     }
 
@@ -351,7 +353,7 @@ impl Hypothesis {
 
     /// Kalman update; `seen` is spent.
     pub fn update(&mut self, layout: Layout, seen: &mut Innovation, bias: bool) {
-        if !seen.sound {
+        if !seen.regular {
             return;
         }
         let (p, stride) = (layout.p, layout.stride());
@@ -471,7 +473,7 @@ impl Hypothesis {
                 self.cov[j * stride + i] = sum;
             }
             let start = step.settings.start_elsewhere[j];
-            self.cov[j * stride + j] += 1e-12 * start * start;
+            self.cov[j * stride + j] += step.tuning.state_floor * start * start;
         }
     }
 
@@ -508,7 +510,7 @@ impl Hypothesis {
                 self.cov[k * stride + k] += share * share * noise * noise;
             }
             if has(self.scaled, q) {
-                self.cov[k * stride + k] += 1e-6;
+                self.cov[k * stride + k] += step.tuning.gain_fault_walk;
             }
         }
     }
@@ -545,7 +547,7 @@ impl Hypothesis {
         let (load, gain, fault) = (layout.load(), layout.gain(), layout.fault());
         for (k, &most) in model.most[..fault].iter().enumerate() {
             let most = if (load..gain).contains(&k) {
-                4.0 * most.max(self.z[k] * self.z[k])
+                step.tuning.load_limit * most.max(self.z[k] * self.z[k])
             } else {
                 most
             };
@@ -554,7 +556,7 @@ impl Hypothesis {
         for k in fault..active {
             let size = step.settings.fault_size[k - fault];
             let most = match has(self.flagged(), k - fault) {
-                true => 2.0 * size * size,
+                true => step.tuning.fault_limit * size * size,
                 false => model.most[k],
             };
             self.keep_below(step, active, k, most);

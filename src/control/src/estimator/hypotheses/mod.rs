@@ -1,8 +1,8 @@
-//! The state-based fault estimator: hypotheses in competition by likelihood, each with its price.
+//! The state-based fault estimator: hypotheses in competition by likelihood, each with its prior probability.
 //!
 //! One Kalman filter of the joint state `[x; d; l; g; f]` stands for each hypothesis: plant state,
 //! periodic disturbance, loads on the state, relative errors of the input gains, sensor faults. A
-//! sample may mean that all goes on, that a load or an input gain jumped, that sensors failed (by a
+//! sample may mean that nothing happened, that a load or an input gain jumped, that sensors failed (by a
 //! bias, a wrong gain, a frozen value), changed their fault, or recovered. Each of these has a
 //! probability per sample, and the likelihood of the readings decides between what they leave.
 //!
@@ -16,13 +16,13 @@ mod effect;
 mod hypothesis;
 mod linear;
 mod model;
+mod model_run;
 mod modes;
-mod own_run;
 mod propose;
 mod start;
 mod trial;
 
-use crate::tuning::BANK;
+use crate::tuning::BankTuning;
 use alloc::vec::Vec;
 pub use hypothesis::{Hypothesis, Reading, Sensors, has};
 pub use model::Layout;
@@ -33,14 +33,16 @@ use competition::Candidates;
 use hypothesis::{Innovation, Step};
 use linear::dot;
 use model::ModeModel;
-use own_run::OwnRun;
+use model_run::ModelRun;
 use serde::{Deserialize, Serialize};
-use trial::Outlook;
+use trial::Expectation;
 
 /// Most modes where the mode is not told: each but the leading one needs a hypothesis.
 pub const MOST_MODES: usize = 9;
+/// Most hypotheses that may be kept after a sample.
+pub const MOST_KEPT: usize = 12;
 /// Most hypotheses that may exist while a sample is judged.
-const SLOTS: usize = 2 * BANK.kept + MOST_MODES - 1;
+const SLOTS: usize = 2 * MOST_KEPT + MOST_MODES - 1;
 
 /// The estimator: immutable, shared by any number of [`BankState`]s.
 #[derive(Clone, Debug)]
@@ -48,10 +50,11 @@ pub struct Bank {
     layout: Layout,
     modes: Vec<ModeModel>,
     settings: Hypotheses,
+    tuning: BankTuning,
     rotation: Vec<(f64, f64)>,
     /// Of each pair of the disturbance: the error of its angle, and the least growth of its variance.
     waves: Vec<(f64, f64)>,
-    prices: Prices,
+    log_rates: LogRates,
     /// Whether a switch shows in the sample in which it happens (modes x modes).
     at_once: Vec<bool>,
     /// Noise deviation of each sensor over its threshold (p).
@@ -60,7 +63,7 @@ pub struct Bank {
 
 /// Logarithms of the probabilities per sample.
 #[derive(Clone, Copy, Debug)]
-struct Prices {
+struct LogRates {
     fault: f64,
     stuck: f64,
     release: f64,
@@ -73,12 +76,12 @@ struct Prices {
 
 /// The slots in use, the leading hypothesis first.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-struct Live {
+struct SlotsInUse {
     list: [u8; SLOTS],
     count: usize,
 }
 
-impl Live {
+impl SlotsInUse {
     const NONE: Self = Self {
         list: [0; SLOTS],
         count: 0,
@@ -110,7 +113,7 @@ impl Live {
     }
 
     /// Whether every slot exists, and each once.
-    fn sound(self, slots: usize) -> bool {
+    fn is_consistent(self, slots: usize) -> bool {
         let mut seen = [false; SLOTS];
         let seen = &mut seen[..slots.min(SLOTS)];
         (1..=seen.len()).contains(&self.count)
@@ -126,14 +129,14 @@ impl Live {
 pub struct BankState {
     slots: Vec<Hypothesis>,
     seen: Vec<Innovation>,
-    live: Live,
+    in_use: SlotsInUse,
     candidates: Candidates,
     scratch: Vec<f64>,
-    outlook: Outlook,
+    expectation: Expectation,
     trial: Innovation,
     /// The plant's mode (0-based) by the leading hypothesis.
     mode: usize,
-    /// The mode that moved the model's own run to this sample.
+    /// The mode that moved the model in open loop to this sample.
     moved_by: u32,
     /// The input that acted last (m), and how it moved (m).
     u: Vec<f64>,
@@ -148,20 +151,20 @@ pub struct BankState {
     /// many samples (p each).
     evidence: Vec<f64>,
     evidence_before: Vec<f64>,
-    /// The reading that repeats, and the output of the model's own run when it came first (p each).
+    /// The reading that repeats, and the output of the model in open loop when it came first (p each).
     repeated: Vec<f64>,
     moved_from: Vec<f64>,
     mean: Vec<f64>,
     count: Vec<f64>,
     best: usize,
-    /// Sensors that loads have moved away from the model's own run.
+    /// Sensors that loads have moved away from the model in open loop.
     apart: Sensors,
     /// Running mean of the leading hypothesis's squared whitened innovation.
     misfit: f64,
-    /// The model's own run under the commands alone.
-    own: OwnRun,
+    /// The model in open loop under the commands alone.
+    unloaded: ModelRun,
     /// The same under the loads and gain errors that are usual.
-    usual: OwnRun,
+    usual: ModelRun,
     /// Outputs that the leading hypothesis expects of healthy sensors (p).
     pub expected: Vec<f64>,
     /// What the readings leave unexplained; of a flagged sensor its fault (p).
@@ -186,7 +189,7 @@ crate::state!(BankState {
         seen,
         candidates,
         scratch,
-        outlook,
+        expectation,
         trial,
         u,
         moved,
@@ -198,7 +201,7 @@ crate::state!(BankState {
         moved_from,
         mean,
         count,
-        own,
+        unloaded,
         usual,
         expected,
         residual,
@@ -207,7 +210,7 @@ crate::state!(BankState {
     ],
     constants: [],
     counters: [
-        live,
+        in_use,
         mode,
         moved_by,
         first,
@@ -250,55 +253,55 @@ impl Bank {
     }
 
     fn judge(&self, state: &mut BankState, mode: usize, reading: Reading<'_>) {
-        let layout = self.layout;
+        let (layout, tuning) = (self.layout, &self.tuning);
         let p = layout.p;
-        if self.prices.mode.is_none() {
+        if self.log_rates.mode.is_none() {
             self.tell(state, mode);
         }
         let bias = self.output_error();
         let z = &state.slots[state.best].z;
         let model = self.model(state, state.best);
-        for run in [&mut state.own, &mut state.usual] {
-            run.read(model, &self.settings, z, reading.noise);
+        for run in [&mut state.unloaded, &mut state.usual] {
+            run.read(model, (&self.settings, &self.tuning), z, reading.noise);
         }
-        for slot in state.live.slots() {
+        for slot in state.in_use.slots() {
             let model = self.model(state, slot);
             let h = &state.slots[slot];
             let seen = &mut state.seen[slot];
             seen.predict(layout, model, reading, h, bias);
         }
-        let head = state.live.first();
+        let head = state.in_use.first();
         self.watch(state, head, reading);
-        for slot in state.live.slots() {
+        for slot in state.in_use.slots() {
             state.seen[slot].whiten(p);
         }
         let h = &state.slots[head];
-        let calm = h.flagged() == 0
+        let nothing_happened = h.flagged() == 0
             && !h.loose
-            && state.seen[head].square < BANK.quiet + 2.0 * p as f64
-            && state.seen[head].sound
-            && state.evidence.iter().all(|&e| e < BANK.frozen_evidence)
+            && state.seen[head].square < tuning.quiet(p)
+            && state.seen[head].regular
+            && state.evidence.iter().all(|&e| e < tuning.frozen_evidence)
             && !state.first
             && state.apart == 0
             && !(self.settings.trusts_model() && state.suspect != 0)
             && self.undisputed(state);
-        if calm {
-            self.go_on(state);
+        if nothing_happened {
+            self.continue_all(state);
         } else {
             self.compete(state, reading);
         }
         state.first = false;
         state.mode = state.slots[state.best].mode as usize;
-        self.correct_own_run(state, reading);
+        self.correct_model_runs(state, reading);
         self.learn_noise(state, reading);
         self.conclude(state, reading);
-        let displaced = state.own.displaced(&state.expected, BANK.displaced);
-        state.apart = state.own.displaced(&state.expected, BANK.returned);
-        state.own.learn(&state.expected);
-        state.usual.learn(&state.expected);
+        let displaced = state.unloaded.displaced(&state.expected, tuning.displaced);
+        state.apart = state.unloaded.displaced(&state.expected, tuning.returned);
+        state.unloaded.learn(tuning, &state.expected);
+        state.usual.learn(tuning, &state.expected);
         let best = &state.slots[state.best];
         if best.flagged() == 0 && !best.loose {
-            state.usual.learn_loads(layout, &best.z);
+            state.usual.learn_loads(tuning, layout, &best.z);
         }
         state.suspect |= displaced & !state.slots[state.best].flagged();
     }
@@ -306,12 +309,12 @@ impl Bank {
     /// Noise of the sensors that are used, from the innovations of the leading hypothesis: the mean
     /// of the noise's square given the reading. The design's noise is the least.
     fn learn_noise(&self, state: &mut BankState, reading: Reading<'_>) {
-        let p = self.layout.p;
+        let (p, tuning) = (self.layout.p, &self.tuning);
         let (seen, flagged) = (&state.seen[state.best], state.slots[state.best].flagged());
-        if !seen.sound {
+        if !seen.regular {
             return;
         }
-        state.noise_samples = (state.noise_samples + 1.0).min(BANK.noise_memory);
+        state.noise_samples = (state.noise_samples + 1.0).min(tuning.noise_memory);
         for q in 0..p {
             if !has(reading.valid & !flagged, q) {
                 continue;
@@ -320,19 +323,19 @@ impl Bank {
             let variance = dot(factor, factor);
             let noise = reading.noise[q] * reading.noise[q];
             let share = noise / variance;
-            let square = (seen.r[q] * seen.r[q]).min(BANK.outlier * variance);
+            let square = (seen.r[q] * seen.r[q]).min(tuning.outlier * variance);
             let relative = share * (square / variance) + (1.0 - share);
             if relative.is_finite() {
                 let ratio = &mut state.noise_ratio[q];
                 *ratio += *ratio * (relative - 1.0) / state.noise_samples;
-                *ratio = ratio.clamp(1.0, BANK.noise_limit);
+                *ratio = ratio.clamp(1.0, tuning.noise_limit);
             }
         }
     }
 
     /// Which sensors repeat one value while the model moves.
     fn watch(&self, state: &mut BankState, head: usize, reading: Reading<'_>) {
-        let p = self.layout.p;
+        let (p, tuning) = (self.layout.p, &self.tuning);
         let (h, seen) = (&state.slots[head], &state.seen[head]);
         state.evidence_before.copy_from_slice(&state.evidence);
         for q in 0..p {
@@ -345,9 +348,9 @@ impl Bank {
             let variance = reading.noise[q] * reading.noise[q];
             if y != state.repeated[q] {
                 state.repeated[q] = y;
-                state.moved_from[q] = state.own.y[q];
+                state.moved_from[q] = state.unloaded.y[q];
             }
-            let moved = state.own.y[q] - state.moved_from[q];
+            let moved = state.unloaded.y[q] - state.moved_from[q];
             if state.count[q] == 0.0 {
                 state.mean[q] = y;
                 state.count[q] = 1.0;
@@ -356,12 +359,12 @@ impl Bank {
             }
             let off = y - state.mean[q];
             let s = seen.s[q * p + q];
-            let gain = 0.5 * (seen.r[q] * seen.r[q] / s).min(50.0)
+            let gain = 0.5 * (seen.r[q] * seen.r[q] / s).min(tuning.frozen_outlier)
                 - 0.5 * off * off / (variance * (1.0 + 1.0 / state.count[q]))
-                - 0.02;
-            let repeats = moved * moved > BANK.displaced * variance;
+                - tuning.frozen_loss;
+            let repeats = moved * moved > tuning.displaced * variance;
             state.evidence[q] += if repeats {
-                gain.max(BANK.repeat_evidence)
+                gain.max(tuning.repeat_evidence)
             } else {
                 gain
             };
@@ -371,13 +374,13 @@ impl Bank {
                 state.count[q] = 1.0;
             } else {
                 state.count[q] += 1.0;
-                state.mean[q] += off / state.count[q].min(200.0);
+                state.mean[q] += off / state.count[q].min(tuning.frozen_memory);
             }
         }
     }
 
-    /// The model's own run, where it moved in a mode that the plant was not in.
-    fn correct_own_run(&self, state: &mut BankState, reading: Reading<'_>) {
+    /// The model in open loop, where it moved in a mode that the plant was not in.
+    fn correct_model_runs(&self, state: &mut BankState, reading: Reading<'_>) {
         let best = &state.slots[state.best];
         if best.moved_by == state.moved_by {
             return;
@@ -386,9 +389,14 @@ impl Bank {
         let moved = &self.modes[best.moved_by as usize];
         let next = &mut state.scratch[..self.layout.n];
         let model = &self.modes[state.mode];
-        for run in [&mut state.own, &mut state.usual] {
+        for run in [&mut state.unloaded, &mut state.usual] {
             run.repeat(self.layout, moved, &state.u, next);
-            run.read(model, &self.settings, &best.z, reading.noise);
+            run.read(
+                model,
+                (&self.settings, &self.tuning),
+                &best.z,
+                reading.noise,
+            );
         }
     }
 
@@ -408,8 +416,9 @@ impl Bank {
                 state.seen[state.best].r[q]
             };
         }
-        state.misfit += BANK.misfit_share * (state.seen[state.best].square.min(1e3) - state.misfit);
-        state.model_valid = state.misfit < 4.0 * p as f64 && !h.loose;
+        let square = state.seen[state.best].square.min(self.tuning.misfit_limit);
+        state.misfit += self.tuning.misfit_share * (square - state.misfit);
+        state.model_valid = state.misfit < self.tuning.misfit_invalid * p as f64 && !h.loose;
         self.find_load(state, model);
         state.actuator_fault = 0;
         for (j, (load, size)) in state.load.iter().zip(&self.settings.input_load).enumerate() {
@@ -448,7 +457,7 @@ impl Bank {
         let best = state.best;
         let (seen, h) = (&mut state.seen[best], &mut state.slots[best]);
         h.z.fill(0.0);
-        if seen.sound {
+        if seen.regular {
             for q in 0..p {
                 // What is no measurement has a row of zeros.
                 seen.white[q] = dy.get(q).copied().unwrap_or(0.0);
@@ -474,7 +483,7 @@ impl Bank {
         }
         let z = &state.slots[state.best].z;
         let next = &mut state.scratch[..self.layout.n];
-        for run in [&mut state.own, &mut state.usual] {
+        for run in [&mut state.unloaded, &mut state.usual] {
             run.advance(self.layout, model, z, u, next);
         }
         state.moved_by = state.mode as u32;
@@ -483,6 +492,7 @@ impl Bank {
             layout: self.layout,
             model,
             settings: &self.settings,
+            tuning: &self.tuning,
             noise: &state.noise,
             rotation: &self.rotation,
             waves: &self.waves,
@@ -490,7 +500,7 @@ impl Bank {
             u,
             moved: &state.moved,
         };
-        for slot in state.live.slots() {
+        for slot in state.in_use.slots() {
             step.model = &self.modes[state.slots[slot].mode as usize];
             state.slots[slot].advance(&step, &mut state.scratch);
         }
@@ -500,11 +510,11 @@ impl Bank {
 
 impl BankState {
     /// Whether every index in it is one; a state that came as bytes may hold any.
-    pub fn sound(&self) -> bool {
+    pub fn is_consistent(&self) -> bool {
         let modes = self.probability.len();
         let exists = |h: &Hypothesis| h.mode.max(h.moved_by) < modes as u32;
-        self.live.sound(self.slots.len())
-            && self.live.contains(self.best)
+        self.in_use.is_consistent(self.slots.len())
+            && self.in_use.contains(self.best)
             && self.mode < modes
             && self.slots.iter().all(exists)
     }
@@ -516,7 +526,7 @@ impl BankState {
 
     /// The hypotheses in competition.
     pub fn hypotheses(&self) -> impl Iterator<Item = &Hypothesis> {
-        self.live.slots().filter_map(|slot| self.slots.get(slot))
+        self.in_use.slots().filter_map(|slot| self.slots.get(slot))
     }
 
     /// The leading hypothesis.

@@ -1,6 +1,6 @@
 //! The plant's mode under each hypothesis: told with every sample, or found from the readings.
 //!
-//! Where it is not told, each sample may be the first in another mode, at the price of a switch: beside
+//! Where it is not told, each sample may be the first in another mode, with the probability of a switch: beside
 //! the leading hypothesis stands one for every other mode, made anew from it whenever it explains the
 //! readings much worse than a switch at this sample would. So the evidence for another mode sums up over
 //! samples, and begins again where it fails.
@@ -8,8 +8,7 @@
 use super::hypothesis::{Hypothesis, Innovation};
 use super::linear::dot;
 use super::model::{Layout, ModeModel};
-use super::{Bank, BankState, Live};
-use crate::tuning::BANK;
+use super::{Bank, BankState, SlotsInUse};
 
 /// Whether two modes differ in what they make of one state, so that a switch shows in the sample of it.
 pub(super) fn differ_at_once(one: &ModeModel, other: &ModeModel) -> bool {
@@ -19,7 +18,7 @@ pub(super) fn differ_at_once(one: &ModeModel, other: &ModeModel) -> bool {
 impl Bank {
     /// How many other modes the plant may be in.
     pub(super) fn others(&self) -> usize {
-        match self.prices.mode {
+        match self.log_rates.mode {
             Some(_) => self.modes.len().saturating_sub(1),
             None => 0,
         }
@@ -32,7 +31,7 @@ impl Bank {
 
     /// The plant is in `mode`, whatever else holds.
     pub(super) fn tell(&self, state: &mut BankState, mode: usize) {
-        for slot in state.live.slots() {
+        for slot in state.in_use.slots() {
             let h = &mut state.slots[slot];
             match state.first {
                 true => (h.mode, h.moved_by) = (mode as u32, mode as u32),
@@ -65,40 +64,42 @@ impl Bank {
                 sum += v * v;
             }
             let k = load + i;
-            h.cov[k * stride + k] += error * sum + 2.0 * (h.z[k] * h.z[k]).max(mean);
+            h.cov[k * stride + k] +=
+                error * sum + self.tuning.load_at_switch * (h.z[k] * h.z[k]).max(mean);
         }
     }
 
     /// Whether nothing stands beside the leading hypothesis but others of its kind in other modes, and
     /// explains the sample no better.
     pub(super) fn undisputed(&self, state: &BankState) -> bool {
-        if state.live.count == 1 {
+        if state.in_use.count == 1 {
             return true;
         }
         let p = self.layout.p;
         let after = |slot: usize| state.slots[slot].score + state.seen[slot].likelihood(p);
-        let head = state.live.first();
+        let head = state.in_use.first();
         let lead = after(head);
-        let mut rivals = state.live.slots().skip(1);
+        let mut rivals = state.in_use.slots().skip(1);
         rivals.all(|slot| {
             let (h, leading) = (&state.slots[slot], &state.slots[head]);
             stands_for(h, leading, h.mode) && h.mode != leading.mode && after(slot) <= lead
         })
     }
 
-    /// All goes on under every hypothesis in competition.
-    pub(super) fn go_on(&self, state: &mut BankState) {
-        let (p, head) = (self.layout.p, state.live.first());
-        let likelihood = |seen: &Innovation| match state.live.count {
+    /// Nothing happened to every hypothesis in competition.
+    pub(super) fn continue_all(&self, state: &mut BankState) {
+        let (p, head) = (self.layout.p, state.in_use.first());
+        let likelihood = |seen: &Innovation| match state.in_use.count {
             1 => 0.0,
             _ => seen.likelihood(p),
         };
         let lead = state.slots[head].score + likelihood(&state.seen[head]);
-        for slot in state.live.slots() {
+        for slot in state.in_use.slots() {
             let (h, seen) = (&mut state.slots[slot], &mut state.seen[slot]);
             h.score += likelihood(seen) - lead;
             h.update(self.layout, seen, self.output_error());
-            h.misfit += BANK.misfit_share * (seen.square.min(1e3) - h.misfit);
+            let square = seen.square.min(self.tuning.misfit_limit);
+            h.misfit += self.tuning.misfit_share * (square - h.misfit);
         }
         state.slots[head].score = 0.0;
         state.best = head;
@@ -111,25 +112,27 @@ impl Bank {
     /// A hypothesis for every other mode: that the plant has entered it with this sample, or enters it now.
     /// What shows at once is looked for once the state has `moved` to the coming sample, the rest before.
     pub(super) fn branch(&self, state: &mut BankState, moved: bool) {
-        let Some(price) = self.prices.mode else {
+        let Some(log_rate) = self.log_rates.mode else {
             return;
         };
-        let head = state.live.first();
+        let head = state.in_use.first();
         let (count, leading) = (self.modes.len(), state.slots[head].mode as usize);
         for mode in (0..count).filter(|&mode| mode != leading) {
             if self.at_once[leading * count + mode] != moved {
                 continue;
             }
             let lead = &state.slots[head];
-            let score = lead.score + price;
-            let standing = state.live.slots().skip(1);
+            let score = lead.score + log_rate;
+            let standing = state.in_use.slots().skip(1);
             let standing = standing
                 .filter(|&slot| stands_for(&state.slots[slot], lead, mode as u32))
                 .max_by(|&a, &b| state.slots[a].score.total_cmp(&state.slots[b].score));
             let slot = match standing {
-                Some(slot) if state.slots[slot].score >= score - BANK.switch_restart => continue,
+                Some(slot) if state.slots[slot].score >= score - self.tuning.switch_restart => {
+                    continue;
+                }
                 Some(slot) => slot,
-                None => match free(state.live, state.slots.len()) {
+                None => match free(state.in_use, state.slots.len()) {
                     Some(slot) => slot,
                     None => return,
                 },
@@ -139,7 +142,7 @@ impl Bank {
             child.score = score;
             self.enter(child, mode, &state.u);
             if standing.is_none() {
-                state.live.add(slot);
+                state.in_use.add(slot);
             }
         }
     }
@@ -148,7 +151,7 @@ impl Bank {
     /// hypotheses together.
     pub(super) fn decide_mode(&self, state: &mut BankState) -> usize {
         if self.others() == 0 {
-            return state.slots[state.live.first()].mode as usize;
+            return state.slots[state.in_use.first()].mode as usize;
         }
         self.weigh_modes(state);
         let shares = state.probability.iter().enumerate();
@@ -164,13 +167,13 @@ impl Bank {
     /// The probability of each mode.
     pub(super) fn weigh_modes(&self, state: &mut BankState) {
         let convinced = |slot: &usize| state.slots[*slot].convinced;
-        let scores = state.live.slots().filter(convinced);
+        let scores = state.in_use.slots().filter(convinced);
         let most = scores
             .map(|slot| state.slots[slot].score)
             .fold(f64::NEG_INFINITY, f64::max);
         state.probability.fill(0.0);
         let mut sum = 0.0;
-        for slot in state.live.slots() {
+        for slot in state.in_use.slots() {
             let h = &state.slots[slot];
             if h.convinced {
                 let weight = libm::exp((h.score - most).min(0.0));
@@ -190,6 +193,6 @@ fn stands_for(h: &Hypothesis, leading: &Hypothesis, mode: u32) -> bool {
 }
 
 /// A slot of so many that is not in use.
-fn free(live: Live, slots: usize) -> Option<usize> {
-    (0..slots).find(|&slot| !live.contains(slot))
+fn free(in_use: SlotsInUse, slots: usize) -> Option<usize> {
+    (0..slots).find(|&slot| !in_use.contains(slot))
 }

@@ -3,9 +3,8 @@
 use super::competition::{Action, Candidate};
 use super::hypothesis::{Hypothesis, Reading, Sensors, has};
 use super::model::ModeModel;
-use super::own_run::OwnRun;
+use super::model_run::ModelRun;
 use super::{Bank, BankState};
-use crate::tuning::BANK;
 
 /// The hypothesis to which something may have happened.
 #[derive(Clone, Copy)]
@@ -13,7 +12,7 @@ struct Parent {
     slot: usize,
     /// Before the sample.
     score: f64,
-    /// After it, if all goes on.
+    /// After it, if nothing happened.
     stay: f64,
     flagged: Sensors,
     stuck: Sensors,
@@ -54,11 +53,11 @@ impl Bank {
             stuck: h.stuck,
             loose: h.loose,
             convinced: h.convinced,
-            unlikely: seen.square > BANK.quiet.min(4.0 + p as f64),
+            unlikely: seen.square > self.tuning.unlikely(p),
         };
-        state.outlook.stale = true;
+        state.expectation.stale = true;
         if slot != state.best && self.has_come_to_nothing(h, reading) {
-            parent.stay -= BANK.fading;
+            parent.stay -= self.tuning.fading;
         }
         state
             .candidates
@@ -76,7 +75,7 @@ impl Bank {
         biases
             && faults.all(|q| {
                 let (k, noise) = (fault + q, reading.noise[q]);
-                let most = h.cov[k * (stride + 1)].min(BANK.displaced * noise * noise);
+                let most = h.cov[k * (stride + 1)].min(self.tuning.displaced * noise * noise);
                 h.z[k] * h.z[k] <= most
             })
     }
@@ -92,7 +91,7 @@ impl Bank {
         score: f64,
     ) -> bool {
         let p = self.layout.p;
-        state.live.slots().any(|slot| {
+        state.in_use.slots().any(|slot| {
             let (h, seen) = (&state.slots[slot], &state.seen[slot]);
             slot != parent.slot
                 && h.flagged() == flagged
@@ -100,7 +99,7 @@ impl Bank {
                 && h.convinced
                 && (h.loose, h.mode) == (parent.loose, state.slots[parent.slot].mode)
                 && h.score + seen.likelihood(p) >= score
-                && seen.leaves(r)
+                && seen.leaves(&self.tuning, r)
         })
     }
 
@@ -112,9 +111,10 @@ impl Bank {
         parent: Parent,
         model: &ModeModel,
         reading: Reading<'_>,
-        (action, price, convinced): (Action, f64, bool),
+        (action, log_rate, convinced): (Action, f64, bool),
     ) {
-        let score = parent.score + price + self.trial(state, parent.slot, model, reading, action);
+        let score =
+            parent.score + log_rate + self.trial(state, parent.slot, model, reading, action);
         let by_residual = matches!(action, Action::Bias(_) | Action::Scale(_));
         let at_once = !by_residual || self.settings.trusts_model() || score > parent.stay;
         state
@@ -130,43 +130,43 @@ impl Bank {
         model: &ModeModel,
         reading: Reading<'_>,
     ) {
-        let prices = self.prices;
-        let consider = |state: &mut BankState, action: Action, price: f64| {
-            let told = (action, price, parent.convinced);
+        let log_rates = self.log_rates;
+        let consider = |state: &mut BankState, action: Action, log_rate: f64| {
+            let told = (action, log_rate, parent.convinced);
             self.consider(state, parent, model, reading, told);
         };
         if parent.unlikely {
             for jump in 0..model.jumps.len() {
                 let together = match jump {
-                    0 => BANK.everything,
-                    _ if jump + 1 == model.jumps.len() => BANK.several,
+                    0 => self.tuning.everything,
+                    _ if jump + 1 == model.jumps.len() => self.tuning.several,
                     _ => 1.0,
                 };
-                consider(state, Action::Load(jump), together * prices.load);
+                consider(state, Action::Load(jump), together * log_rates.load);
             }
             if !parent.loose {
-                consider(state, Action::Loosen, prices.changed);
+                consider(state, Action::Loosen, log_rates.changed);
             }
         }
         if parent.loose {
-            let score = parent.stay + prices.release;
+            let score = parent.stay + log_rates.release;
             let tight = parent.then(Action::Tighten, score, parent.convinced);
             state.candidates.add(tight);
         }
         if state.first {
             if parent.flagged == 0 {
-                consider(state, Action::Start, prices.fault);
+                consider(state, Action::Start, log_rates.fault);
             }
             return;
         }
-        for back in [Action::Home, Action::Return] {
-            let run = back.run(&state.own, &state.usual);
+        for back in [Action::Unloaded, Action::UsualLoad] {
+            let run = back.run(&state.unloaded, &state.usual);
             let output = &state.seen[parent.slot].output;
-            if parent.unlikely && run.displaced(output, BANK.returned) != 0 {
-                // What stands against the loads that would then be gone makes up for the price of a fault.
+            if parent.unlikely && run.displaced(output, self.tuning.returned) != 0 {
+                // What stands against the loads that would then be gone makes up for the small probability of a fault.
                 let z = &state.slots[parent.slot].z;
                 let against = self.implausible(model, z, run);
-                consider(state, back, (prices.fault + against).min(0.0));
+                consider(state, back, (log_rates.fault + against).min(0.0));
             }
         }
         if parent.flagged == 0 {
@@ -174,7 +174,7 @@ impl Bank {
         }
     }
 
-    /// The sensors that have left the model's own run may have drifted, and no load acts. It is followed
+    /// The sensors that have left the model in open loop may have drifted, and no load acts. It is followed
     /// beside the explanation by loads, so that the end of the drift is recognised; it decides only where
     /// the model is trusted.
     fn propose_drift(
@@ -186,20 +186,23 @@ impl Bank {
     ) {
         let trusted = self.settings.trusts_model();
         let limit = if trusted {
-            BANK.displaced
+            self.tuning.displaced
         } else {
-            BANK.returned
+            self.tuning.returned
         };
-        let set = state.own.displaced(&state.seen[parent.slot].output, limit) & reading.valid;
+        let set = state
+            .unloaded
+            .displaced(&state.seen[parent.slot].output, limit)
+            & reading.valid;
         let known =
             |other: usize| state.slots[other].additive == set && !state.slots[other].convinced;
-        if set == 0 || !trusted && state.live.slots().any(known) {
+        if set == 0 || !trusted && state.in_use.slots().any(known) {
             return;
         }
         let value = self.trial(state, parent.slot, model, reading, Action::Drift(set));
-        if state.trial.square < BANK.quiet + 2.0 * self.layout.p as f64 {
+        if state.trial.square < self.tuning.quiet(self.layout.p) {
             let score = match trusted {
-                true => parent.stay.max(parent.score + value) + 1.0,
+                true => parent.stay.max(parent.score + value) + self.tuning.drift_lead,
                 false => parent.stay,
             };
             let drift = parent.then(Action::Drift(set), score, trusted);
@@ -220,26 +223,29 @@ impl Bank {
         }
         let p = self.layout.p;
         let free = sensors(p) & !parent.flagged & reading.valid;
-        let price = if state.first {
-            BANK.start_fault
+        let log_rate = if state.first {
+            self.tuning.start_fault
         } else {
-            self.prices.fault
+            self.log_rates.fault
         };
-        let mut consider = |action: Action, price: f64| {
-            let told = (action, price, parent.convinced);
+        let mut consider = |action: Action, log_rate: f64| {
+            let told = (action, log_rate, parent.convinced);
             self.consider(state, parent, model, reading, told);
         };
         for q in (0..p).filter(|&q| has(free, q)) {
-            consider(Action::Bias(1 << q), price);
-            consider(Action::Scale(q), price);
-            if p > 2 && p <= 4 {
+            consider(Action::Bias(1 << q), log_rate);
+            consider(Action::Scale(q), log_rate);
+            if p > 2 && p as f64 <= self.tuning.pairs_up_to {
                 for other in (0..q).filter(|&other| has(free, other)) {
-                    consider(Action::Bias(1 << q | 1 << other), BANK.several * price);
+                    consider(
+                        Action::Bias(1 << q | 1 << other),
+                        self.tuning.several * log_rate,
+                    );
                 }
             }
         }
         if free.count_ones() > 1 {
-            consider(Action::Bias(free), BANK.several * price);
+            consider(Action::Bias(free), self.tuning.several * log_rate);
         }
     }
 
@@ -251,21 +257,21 @@ impl Bank {
         model: &ModeModel,
         reading: Reading<'_>,
     ) {
-        let (p, prices) = (self.layout.p, self.prices);
-        let leads = parent.slot == state.live.first();
+        let (p, log_rates) = (self.layout.p, self.log_rates);
+        let leads = parent.slot == state.in_use.first();
         let known = parent.flagged & reading.valid;
         for q in 0..p {
             let may_freeze = has(sensors(p) & !parent.stuck & reading.valid, q);
-            if may_freeze && leads && state.evidence[q] > BANK.frozen_evidence {
-                let price = prices.stuck + state.evidence_before[q];
-                let freeze = (Action::Freeze(q), price, parent.convinced);
+            if may_freeze && leads && state.evidence[q] > self.tuning.frozen_evidence {
+                let log_rate = log_rates.stuck + state.evidence_before[q];
+                let freeze = (Action::Freeze(q), log_rate, parent.convinced);
                 self.consider(state, parent, model, reading, freeze);
             }
             if !has(known, q) {
                 continue;
             }
             if parent.unlikely {
-                let change = (Action::Change(1 << q), prices.change, parent.convinced);
+                let change = (Action::Change(1 << q), log_rates.change, parent.convinced);
                 self.consider(state, parent, model, reading, change);
             }
             let last = parent.flagged.count_ones() == 1;
@@ -275,17 +281,21 @@ impl Bank {
                 parent,
                 model,
                 reading,
-                (1 << q, prices.release, convinced),
+                (1 << q, log_rates.release, convinced),
             );
         }
         if known.count_ones() > 1 {
-            let all = (parent.flagged, BANK.several * prices.release, true);
+            let all = (
+                parent.flagged,
+                self.tuning.several * log_rates.release,
+                true,
+            );
             self.propose_release(state, parent, model, reading, all);
         }
     }
 
     /// What a priori stands against the loads in `z` (N) where those of `run` are usual, in log likelihood.
-    fn implausible(&self, model: &ModeModel, z: &[f64], run: &OwnRun) -> f64 {
+    fn implausible(&self, model: &ModeModel, z: &[f64], run: &ModelRun) -> f64 {
         let mut sum = 0.0;
         for (k, &size) in (self.layout.load()..).zip(&model.load_size) {
             let off = z[k] - run.load(k);
@@ -304,11 +314,11 @@ impl Bank {
         parent: Parent,
         model: &ModeModel,
         reading: Reading<'_>,
-        (set, price, convinced): (Sensors, f64, bool),
+        (set, log_rate, convinced): (Sensors, f64, bool),
     ) {
         let action = Action::Release(set);
         let value = self.trial(state, parent.slot, model, reading, action);
-        let score = parent.score + price + value;
+        let score = parent.score + log_rate + value;
         let left = parent.flagged & !set;
         if !self.is_said_already(state, parent, &state.trial.r, left, score) {
             state.candidates.add(parent.then(action, score, convinced));

@@ -4,13 +4,13 @@ use super::competition::Candidates;
 use super::hypothesis::{Hypothesis, Innovation};
 use super::linear::{axpy, factor, solve};
 use super::model::{Layout, ModeModel};
+use super::model_run::ModelRun;
 use super::modes::differ_at_once;
-use super::own_run::OwnRun;
-use super::trial::Outlook;
-use super::{Bank, BankState, Live, Prices};
+use super::trial::Expectation;
+use super::{Bank, BankState, LogRates, SlotsInUse};
 use crate::matrix::Matrix;
 use crate::parameters::{Hypotheses, ModeModel as Described};
-use crate::tuning::BANK;
+use crate::tuning::BankTuning;
 use alloc::vec;
 use alloc::vec::Vec;
 
@@ -103,12 +103,17 @@ fn loads(
     (rows(&effect), sizes, growth)
 }
 
-fn model(layout: Layout, mode: &Described, settings: &Hypotheses) -> ModeModel {
+fn model(
+    layout: Layout,
+    mode: &Described,
+    settings: &Hypotheses,
+    tuning: &BankTuning,
+) -> ModeModel {
     let Layout { n, m, .. } = layout;
     let (b, c) = (rows(&mode.b), rows(&mode.c));
     let spread = |row: &[f64]| {
         let parts = row.iter().zip(&settings.state_size);
-        0.25 * parts.map(|(c, size)| (c * size) * (c * size)).sum::<f64>()
+        tuning.usual_deviation * parts.map(|(c, size)| (c * size) * (c * size)).sum::<f64>()
     };
     let bias: Vec<f64> = c.chunks_exact(n).map(spread).collect();
     let inverse = left_inverse(&b, n, m);
@@ -116,13 +121,13 @@ fn model(layout: Layout, mode: &Described, settings: &Hypotheses) -> ModeModel {
     let error = settings.model_error;
     let starts = settings.start_elsewhere.iter();
     let most = starts
-        .map(|size| 1e8 * size * size)
+        .map(|size| tuning.state_limit * size * size)
         .chain(settings.disturbance_size.iter().map(|size| size * size))
         .chain(loads.1.iter().map(|size| size * size))
         .chain((0..m).map(|_| settings.gain_error * settings.gain_error))
         .chain(bias.iter().map(|bias| bias * error * error))
         .collect();
-    let harmonics = settings.angles.len();
+    let harmonics = harmonics_of(settings);
     ModeModel::new(
         layout,
         rows(&mode.a),
@@ -152,25 +157,50 @@ fn as_fitted<'a>(
     })
 }
 
+/// Harmonics of the disturbance that are estimated.
+fn harmonics_of(settings: &Hypotheses) -> usize {
+    settings.period.map_or(0, |known| known.harmonics)
+}
+
 /// Per pair of the disturbance's `d` states: the error of its angle, and the least growth of its variance.
-fn waves_of(settings: &Hypotheses, d: usize) -> Vec<(f64, f64)> {
+fn waves_of(
+    settings: &Hypotheses,
+    tuning: &BankTuning,
+    angles: &[f64],
+    d: usize,
+) -> Vec<(f64, f64)> {
     let sizes = settings.disturbance_size.iter().step_by(2);
-    let angles = settings.angles.iter().cycle();
+    let angles = angles.iter().cycle();
     let pairs = angles.zip(sizes).take(d / 2);
     pairs
-        .map(|(angle, size)| (settings.period_error * angle, 1e-8 * (size * size)))
+        .map(|(angle, size)| {
+            (
+                settings.period_error * angle,
+                tuning.wave_floor * (size * size),
+            )
+        })
         .collect()
 }
 
 impl Bank {
     /// The estimator of a plant with these `modes` and decision `thresholds` (p); the sizes in `settings`
     /// must agree with it.
-    pub fn new(modes: &[Described], settings: &Hypotheses, thresholds: &[f64]) -> Self {
+    pub fn new(
+        modes: &[Described],
+        sample_time: f64,
+        settings: &Hypotheses,
+        tuning: BankTuning,
+        thresholds: &[f64],
+    ) -> Self {
+        let angles: Vec<f64> = match settings.period {
+            Some(known) => known.angles(sample_time).collect(),
+            None => Vec::new(),
+        };
         let (n, m, p) = modes.first().map_or((0, 0, 0), |mode| {
             (mode.a.nrows(), mode.b.ncols(), mode.c.nrows())
         });
         let disturbances = settings.disturbance_load.len();
-        let d = 2 * settings.angles.len() * disturbances;
+        let d = 2 * harmonics_of(settings) * disturbances;
         let layout = Layout {
             n,
             m,
@@ -180,13 +210,12 @@ impl Bank {
         };
         let ln = libm::log;
         let turn = |_| {
-            settings
-                .angles
+            angles
                 .iter()
                 .map(|&angle| (libm::cos(angle), libm::sin(angle)))
         };
         let modes: Vec<ModeModel> = as_fitted(modes, settings)
-            .map(|mode| model(layout, &mode, settings))
+            .map(|mode| model(layout, &mode, settings, &tuning))
             .collect();
         let pairs = modes
             .iter()
@@ -198,14 +227,14 @@ impl Bank {
                 .collect(),
             modes,
             rotation: (0..disturbances).flat_map(turn).collect(),
-            waves: waves_of(settings, d),
-            prices: Prices {
+            waves: waves_of(settings, &tuning, &angles, d),
+            log_rates: LogRates {
                 fault: ln(settings.fault_rate),
                 stuck: ln(settings.stuck_rate),
                 release: ln(settings.release_rate),
                 change: ln(settings.change_rate),
                 load: ln(settings.load_rate),
-                changed: BANK.everything * ln(settings.load_rate),
+                changed: tuning.everything * ln(settings.load_rate),
                 mode: settings.mode_rate.map(ln),
             },
             noise_per_threshold: settings
@@ -215,6 +244,7 @@ impl Bank {
                 .map(|(noise, threshold)| noise / threshold.abs().max(f64::MIN_POSITIVE))
                 .collect(),
             settings: settings.clone(),
+            tuning,
         }
     }
 
@@ -237,17 +267,20 @@ impl Bank {
             .chain(others)
             .map(|mode| self.at_rest(mode))
             .collect();
-        let mut live = Live::NONE;
-        (0..slots.len()).for_each(|slot| live.add(slot));
-        slots.resize(2 * BANK.kept + self.others(), Hypothesis::new(layout));
+        let mut in_use = SlotsInUse::NONE;
+        (0..slots.len()).for_each(|slot| in_use.add(slot));
+        slots.resize(
+            2 * self.tuning.kept as usize + self.others(),
+            Hypothesis::new(layout),
+        );
         BankState {
             seen: vec![Innovation::new(layout); slots.len()],
             candidates: Candidates::new(slots.len(), p, model.jumps.len()),
             slots,
-            live,
+            in_use,
             probability: vec![0.0; self.modes.len()],
             scratch: vec![0.0; n.max(1) * stride],
-            outlook: Outlook::new(p),
+            expectation: Expectation::new(p),
             trial: Innovation::new(layout),
             mode,
             moved_by: mode as u32,
@@ -255,8 +288,8 @@ impl Bank {
             moved: vec![0.0; m],
             first: true,
             noise: vec![0.0; p],
-            noise_ratio: vec![BANK.noise_at_start; p],
-            noise_samples: BANK.noise_prior,
+            noise_ratio: vec![self.tuning.noise_at_start; p],
+            noise_samples: self.tuning.noise_prior,
             evidence: vec![0.0; p],
             evidence_before: vec![0.0; p],
             repeated: vec![0.0; p],
@@ -266,8 +299,8 @@ impl Bank {
             best: 0,
             apart: 0,
             misfit: p as f64,
-            own: OwnRun::new(model, settings, layout.size()),
-            usual: OwnRun::new(model, settings, layout.size()),
+            unloaded: ModelRun::new(model, settings, layout.size()),
+            usual: ModelRun::new(model, settings, layout.size()),
             expected: vec![0.0; p],
             residual: vec![0.0; p],
             flagged: 0,
@@ -293,13 +326,16 @@ impl Bank {
             set(i, settings.start[i]);
         }
         for (k, size) in model.load_size.iter().enumerate() {
-            set(layout.load() + k, BANK.load_at_start * size);
+            set(layout.load() + k, self.tuning.load_at_start * size);
         }
         for i in 0..d {
             set(n + i, settings.disturbance_size[i]);
         }
         for j in 0..m {
-            set(layout.gain() + j, BANK.load_at_start * settings.gain_error);
+            set(
+                layout.gain() + j,
+                self.tuning.load_at_start * settings.gain_error,
+            );
         }
         rest
     }

@@ -8,14 +8,13 @@ use super::hypothesis::{Hypothesis, Innovation, Kinds, Reading, Sensors, has};
 use super::linear::{combine, padded, sparse_dot};
 use super::model::{Layout, ModeModel};
 use super::{Bank, BankState};
-use crate::tuning::BANK;
 use alloc::vec;
 use alloc::vec::Vec;
 use serde::{Deserialize, Serialize};
 
 /// What a hypothesis expects of outputs and sensor faults: all that a sample can tell apart.
 #[derive(Debug, PartialEq, Serialize, Deserialize)]
-pub(super) struct Outlook {
+pub(super) struct Expectation {
     /// Outputs (p).
     output: Vec<f64>,
     /// Entries of the faults (p).
@@ -30,13 +29,13 @@ pub(super) struct Outlook {
     pub stale: bool,
 }
 
-crate::state!(Outlook {
+crate::state!(Expectation {
     parts: [output, fault, outputs, crossed, faults],
     constants: [],
     counters: [stale]
 });
 
-impl Outlook {
+impl Expectation {
     /// Room for `p` sensors.
     pub fn new(p: usize) -> Self {
         Self {
@@ -99,9 +98,12 @@ fn add_pairs(s: &mut [f64], p: usize, which: Sensors, term: impl Fn(usize, usize
     }
 }
 
-/// Whether what happened puts the state back to the model's own run.
+/// Whether what happened puts the state back to the model in open loop.
 const fn starts_anew(action: Action) -> bool {
-    matches!(action, Action::Home | Action::Return | Action::Drift(_))
+    matches!(
+        action,
+        Action::Unloaded | Action::UsualLoad | Action::Drift(_)
+    )
 }
 
 impl Bank {
@@ -115,9 +117,9 @@ impl Bank {
         action: Action,
     ) -> f64 {
         let p = self.layout.p;
-        if !starts_anew(action) && state.outlook.stale {
+        if !starts_anew(action) && state.expectation.stale {
             let (h, rows) = (&state.slots[slot], &mut state.trial.rows);
-            state.outlook.take(self.layout, model, h, rows);
+            state.expectation.take(self.layout, model, h, rows);
         }
         self.expect(state, slot, reading, action);
         self.open(state, slot, model, reading, action);
@@ -125,14 +127,14 @@ impl Bank {
         state.trial.likelihood(p)
     }
 
-    /// Innovation and covariance of the readings: from the model's own run where the hypothesis starts anew
-    /// from it, else from its outlook.
+    /// Innovation and covariance of the readings: from the model in open loop where the hypothesis starts anew
+    /// from it, else from its expectation.
     fn expect(&self, state: &mut BankState, slot: usize, reading: Reading<'_>, action: Action) {
         let p = self.layout.p;
         let kinds = self.sets(&state.slots[slot], action);
         let bias = self.output_error();
-        let own = action.run(&state.own, &state.usual);
-        let (outlook, mean) = (&state.outlook, &state.mean);
+        let run = action.run(&state.unloaded, &state.usual);
+        let (expectation, mean) = (&state.expectation, &state.mean);
         let Innovation { r, s, weights, .. } = &mut state.trial;
         for q in 0..p {
             s[q * p..=q * p + q].fill(0.0);
@@ -143,23 +145,23 @@ impl Bank {
             }
             let expected;
             (weights[q], expected) = match action {
-                _ if starts_anew(action) => ([1.0, 0.0], own.y[q]),
+                _ if starts_anew(action) => ([1.0, 0.0], run.y[q]),
                 Action::Freeze(frozen) if frozen == q => ([0.0; 2], mean[q]),
                 // The gain opens around its mean; nothing of the old entry counts.
                 Action::Scale(scaled) if scaled == q => {
-                    let factor = 1.0 + BANK.gain_fault_mean;
-                    ([factor, 0.0], factor * outlook.output[q])
+                    let factor = 1.0 + self.tuning.gain_fault_mean;
+                    ([factor, 0.0], factor * expectation.output[q])
                 }
                 _ if self.opens_anew(&state.slots[slot], action, q) => {
-                    ([1.0, 0.0], outlook.output[q])
+                    ([1.0, 0.0], expectation.output[q])
                 }
-                _ => outlook.weigh(q, kinds, bias),
+                _ => expectation.weigh(q, kinds, bias),
             };
             r[q] = reading.y[q] - expected;
             for j in (0..=q).filter(|&j| has(reading.valid, j)) {
                 s[q * p + j] = match starts_anew(action) {
-                    true => own.covariance(q, j),
-                    false => outlook.covariance((q, weights[q]), (j, weights[j])),
+                    true => run.covariance(&self.tuning, q, j),
+                    false => expectation.covariance((q, weights[q]), (j, weights[j])),
                 };
             }
             s[q * p + q] += reading.noise[q] * reading.noise[q];
@@ -201,7 +203,7 @@ impl Bank {
                     s[q * p + q] += self.healthy_variance(model, q);
                 }
             }
-            Action::Home | Action::Return | Action::Drift(_) => {
+            Action::Unloaded | Action::UsualLoad | Action::Drift(_) => {
                 let drifted = self.sets(h, action).additive;
                 for q in (0..p).filter(|&q| has(reading.valid, q)) {
                     s[q * p + q] += match has(drifted, q) {
@@ -211,8 +213,8 @@ impl Bank {
                 }
             }
             Action::Scale(q) => {
-                let output = state.outlook.output[q];
-                s[q * p + q] += output * output * BANK.gain_fault_variance;
+                let output = state.expectation.output[q];
+                s[q * p + q] += output * output * self.tuning.gain_fault_variance;
             }
             Action::Freeze(q) => {
                 let noise = reading.noise[q];

@@ -1,18 +1,18 @@
-//! The model's own run: what the plant would do under the commands alone, and how far that is right.
+//! The model in open loop: what the plant would do under the commands alone, and how far that is right.
 
 use super::hypothesis::Sensors;
 use super::linear::sparse_dot;
 use super::model::{Layout, ModeModel};
 use crate::kernel::bounded;
 use crate::parameters::Hypotheses as Settings;
-use crate::tuning::BANK;
+use crate::tuning::BankTuning;
 use alloc::vec;
 use alloc::vec::Vec;
 use serde::{Deserialize, Serialize};
 
-/// The model's own run.
+/// The model in open loop.
 #[derive(Debug, PartialEq, Serialize, Deserialize)]
-pub(super) struct OwnRun {
+pub(super) struct ModelRun {
     /// State (n).
     pub x: Vec<f64>,
     /// What moved it to this sample: state and disturbance before, loads and gain errors (N, faults unused).
@@ -31,13 +31,13 @@ pub(super) struct OwnRun {
     allowed: Vec<f64>,
 }
 
-crate::state!(OwnRun {
+crate::state!(ModelRun {
     parts: [x, before, y, variances, bound, spread, error, allowed],
     constants: [],
     counters: []
 });
 
-impl OwnRun {
+impl ModelRun {
     /// At rest at the operating point without loads, for a joint state of `size`.
     pub fn new(model: &ModeModel, settings: &Settings, size: usize) -> Self {
         let error = settings.model_error * settings.model_error;
@@ -56,10 +56,16 @@ impl OwnRun {
 
     /// Outputs of the sample, with the disturbance as `z` (N) knows it, and how far readings with this
     /// `noise` (p) may be from them.
-    pub fn read(&mut self, model: &ModeModel, settings: &Settings, z: &[f64], noise: &[f64]) {
+    pub fn read(
+        &mut self,
+        model: &ModeModel,
+        (settings, tuning): (&Settings, &BankTuning),
+        z: &[f64],
+        noise: &[f64],
+    ) {
         let p = self.y.len();
         for k in 0..self.x.len() {
-            self.variances[k] = self.variance(model, settings, k);
+            self.variances[k] = self.variance(model, settings, tuning, k);
         }
         for (q, noise) in noise.iter().enumerate().take(p) {
             self.y[q] = model.output(q, &self.x, z);
@@ -68,7 +74,7 @@ impl OwnRun {
                 self.bound[q * p + j] = allowed;
                 self.bound[j * p + q] = allowed;
             }
-            self.spread[q] = noise * noise + self.share(q) * self.bound[q * p + q];
+            self.spread[q] = noise * noise + self.share(tuning, q) * self.bound[q * p + q];
         }
     }
 
@@ -116,22 +122,28 @@ impl OwnRun {
     }
 
     /// Variance of state `k` that the model's error allows.
-    pub fn variance(&self, model: &ModeModel, settings: &Settings, k: usize) -> f64 {
+    pub fn variance(
+        &self,
+        model: &ModeModel,
+        settings: &Settings,
+        tuning: &BankTuning,
+        k: usize,
+    ) -> f64 {
         let off = settings.model_error * (self.x[k] - model.x0[k]);
-        let start = BANK.start_deviations * settings.start[k];
+        let start = tuning.start_deviations * settings.start[k];
         off * off + start * start
     }
 
     /// Covariance of the outputs `q` and `j`, by what the error has been so far.
-    pub fn covariance(&self, q: usize, j: usize) -> f64 {
-        libm::sqrt(self.share(q) * self.share(j)) * self.bound[q * self.y.len() + j]
+    pub fn covariance(&self, tuning: &BankTuning, q: usize, j: usize) -> f64 {
+        libm::sqrt(self.share(tuning, q) * self.share(tuning, j)) * self.bound[q * self.y.len() + j]
     }
 
     /// Learns which loads and gain errors are usual, from those of the leading hypothesis `z` (N).
-    pub fn learn_loads(&mut self, layout: Layout, z: &[f64]) {
+    pub fn learn_loads(&mut self, tuning: &BankTuning, layout: Layout, z: &[f64]) {
         let loads = layout.load()..layout.fault();
         for (usual, now) in self.before[loads.clone()].iter_mut().zip(&z[loads]) {
-            *usual += (now - *usual) / BANK.usual_load;
+            *usual += (now - *usual) / tuning.usual_load;
         }
     }
 
@@ -141,12 +153,12 @@ impl OwnRun {
     }
 
     /// Learns the error, given the `outputs` (p) that the leading hypothesis expects.
-    pub fn learn(&mut self, outputs: &[f64]) {
+    pub fn learn(&mut self, tuning: &BankTuning, outputs: &[f64]) {
         for (q, output) in outputs.iter().enumerate() {
             let off = output - self.y[q];
-            self.error[q] += (bounded(off * off) - self.error[q]) / BANK.run_memory;
+            self.error[q] += (bounded(off * off) - self.error[q]) / tuning.run_memory;
             let bound = self.bound[q * outputs.len() + q];
-            self.allowed[q] += (bounded(bound) - self.allowed[q]) / BANK.run_memory;
+            self.allowed[q] += (bounded(bound) - self.allowed[q]) / tuning.run_memory;
         }
     }
 
@@ -158,8 +170,8 @@ impl OwnRun {
     }
 
     /// Variance of output `q` relative to what the model's error allows.
-    fn share(&self, q: usize) -> f64 {
-        let [least, most] = BANK.run_share;
+    fn share(&self, tuning: &BankTuning, q: usize) -> f64 {
+        let (least, most) = (tuning.run_share_least, tuning.run_share_most);
         let share = self.error[q] / self.allowed[q].max(f64::MIN_POSITIVE);
         if share.is_finite() {
             share.clamp(least, most)
