@@ -293,7 +293,7 @@ class Bank:
         kept: list[Candidate] = []
         plain = False
         for c in candidates:
-            is_plain = not c.flagged and not c.loose
+            is_plain = not c.flagged and not c.loose and bool(c.convinced)
             stays = c.score >= most - margin and len(kept) < self.tuning["kept"] - (not plain)
             if not stays and (plain or not is_plain):
                 continue
