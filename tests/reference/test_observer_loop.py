@@ -330,13 +330,13 @@ DEPARTURES = {
 
 def depart(design: dict, *, gain: float = 1.0, error: float = 0.0) -> dict:
     """Returns a record whose plant has a weak first input, or relative errors in every entry of A and B."""
-    changed, dice = deepcopy(design), np.random.default_rng(5)
+    changed, random = deepcopy(design), np.random.default_rng(5)
     plant = deepcopy(design["plant"])
     for mode in plant["modes"]:
         mode["b"] = (np.array(mode["b"]) * [gain, 1.0]).tolist()
         for key in "ab":
             matrix = np.array(mode[key])
-            mode[key] = (matrix * (1.0 + error * dice.uniform(-1.0, 1.0, matrix.shape))).tolist()
+            mode[key] = (matrix * (1.0 + error * random.uniform(-1.0, 1.0, matrix.shape))).tolist()
     changed["true_plant"] = {"kind": "linear", "plant": plant}
     return changed
 
