@@ -149,7 +149,7 @@ fn said_of(key: &str) -> String {
         let keys: Vec<&str> = keys.split(", ").map(|key| key.trim_matches('`')).collect();
         let of = keys[0].rsplit_once('.').map_or("", |(section, _)| section);
         let own = |key: &&str| key.rsplit_once('.').map_or(*key, |(_, name)| name) == name;
-        of == section && keys.iter().any(|key| own(&key))
+        of == section && keys.iter().any(own)
     });
     found
         .next()
