@@ -10,17 +10,17 @@ use adapting::{
     with_faults,
 };
 use ftc_simulate::Variant;
-use random_plants::{Dice, design};
+use random_plants::{RandomNumbers, design};
 
 const PLANTS: usize = 25;
 
 #[test]
 fn adapting_is_never_worse_than_not_adapting() {
-    let mut dice = Dice::seeded(7);
+    let mut random = RandomNumbers::seeded(7);
     let mut worst: f64 = 0.0;
     for plant in 0..PLANTS {
-        let mut design = design(&mut dice);
-        with_faults(&mut design, &mut dice);
+        let mut design = design(&mut random);
+        with_faults(&mut design, &mut random);
         let ratio = ratio(&design);
         worst = worst.max(ratio);
         assert!(ratio <= 1.05, "plant {plant}: {ratio}");
@@ -32,8 +32,8 @@ fn adapting_is_never_worse_than_not_adapting() {
 #[test]
 fn nor_where_the_plant_changed_and_faults_hide() {
     for (seed, gain, largest) in [(1, 1.03, 2.0), (2, 0.97, 20.0)] {
-        let mut dice = Dice::seeded(seed);
-        let plants = std::iter::repeat_with(|| changed_plant(&mut dice, gain, largest));
+        let mut random = RandomNumbers::seeded(seed);
+        let plants = std::iter::repeat_with(|| changed_plant(&mut random, gain, largest));
         for (plant, design) in plants.flatten().take(PLANTS).enumerate() {
             let ratio = ratio(&design);
             assert!(ratio <= 1.05, "seed {seed}, plant {plant}: {ratio}");
@@ -44,10 +44,10 @@ fn nor_where_the_plant_changed_and_faults_hide() {
 /// Without any fault, what the predictor leaves unexplained of a plant that changed.
 #[test]
 fn a_plant_that_changed_is_predicted_better() {
-    let mut dice = Dice::seeded(11);
+    let mut random = RandomNumbers::seeded(11);
     let mut gains = Vec::new();
     for _ in 0..PLANTS {
-        let mut design = design(&mut dice);
+        let mut design = design(&mut random);
         design.scenario.steps = STEPS;
         scale_thresholds(&mut design, 10.0);
         change_gains(&mut design, 1.03);
@@ -72,8 +72,8 @@ fn a_plant_that_changed_is_predicted_better() {
 /// sensor flagged: following the residual closed the loop over that predictor, and it diverged.
 #[test]
 fn an_imprecise_predictor_closes_no_loop() {
-    let mut dice = Dice::seeded(32);
-    let plants = std::iter::repeat_with(|| changed_plant(&mut dice, 0.97, 2.0));
+    let mut random = RandomNumbers::seeded(32);
+    let plants = std::iter::repeat_with(|| changed_plant(&mut random, 0.97, 2.0));
     for design in plants.flatten().take(6) {
         let [_, fixed] = errors(&design);
         assert!(fixed.is_some(), "an output is lost");

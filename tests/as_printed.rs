@@ -6,7 +6,7 @@ use ftc_design::as_printed::{theorem_1, theorem_2};
 use ftc_design::{ControlSpec, Lyapunov};
 use ftc_plant::SwitchedPlant;
 use nalgebra::DMatrix;
-use plants::{Channel, Lottery, mode, paper, paper_spec};
+use plants::{Channel, RandomNumbers, mode, paper, paper_spec};
 
 #[test]
 fn theorem_1_has_no_margin_on_the_papers_own_plant() {
@@ -30,10 +30,10 @@ fn theorem_2_has_a_negative_margin_on_the_papers_own_plant() {
 /// However harmless the plant: stable, one mode, every state measured and actuated.
 #[test]
 fn no_plant_satisfies_them() {
-    let mut lottery = Lottery(3);
+    let mut random = RandomNumbers(3);
     for _ in 0..10 {
-        let n = lottery.between(1, 3);
-        let a = 0.1 * lottery.matrix(n, n);
+        let n = random.between(1, 3);
+        let a = 0.1 * random.matrix(n, n);
         let identity = DMatrix::identity(n, n);
         let plant = SwitchedPlant::new(
             1.0,

@@ -102,13 +102,21 @@ fn resets_more_often_than_proved_are_refused() {
     let design = assemble(request(Lyapunov::Common, true)).unwrap();
     ftc_design::coverage::prove(&design).unwrap();
 
-    let mut hasty = design.clone();
-    hasty.controller.feedback.transfer.as_mut().unwrap().samples = 1;
-    let sentence = ftc_design::coverage::prove(&hasty).unwrap_err().to_string();
+    let mut too_soon = design.clone();
+    too_soon
+        .controller
+        .feedback
+        .transfer
+        .as_mut()
+        .unwrap()
+        .samples = 1;
+    let sentence = ftc_design::coverage::prove(&too_soon)
+        .unwrap_err()
+        .to_string();
     assert!(sentence.contains("bumpless"), "{sentence}");
-    let proof = &mut hasty.proof.as_mut().unwrap().running_loop;
+    let proof = &mut too_soon.proof.as_mut().unwrap().running_loop;
     proof.transfer.as_mut().unwrap().mu = 1.0;
-    assert!(ftc_design::coverage::prove(&hasty).is_err());
+    assert!(ftc_design::coverage::prove(&too_soon).is_err());
 
     // Nor does a gain across switches hold that was proved without the resets.
     let mut claimed = design.clone();

@@ -12,7 +12,7 @@ use ftc_design::{
 use ftc_plant::SwitchedPlant;
 use ftc_plant::scaling::Scaling;
 use nalgebra::DMatrix;
-use plants::{Channel, Lottery, paper, paper_spec};
+use plants::{Channel, RandomNumbers, paper, paper_spec};
 
 fn designed(lyapunov: Lyapunov, latency: usize) -> (SwitchedPlant, Synthesis) {
     let plant = paper(Channel::State);
@@ -144,8 +144,8 @@ fn a_damaged_observer_is_refused() {
 }
 
 /// `Q diag(values) Q'` with random orthogonal `Q`, exactly symmetric.
-fn with_spectrum(lottery: &mut Lottery, values: &[f64]) -> DMatrix<f64> {
-    let q = lottery.matrix(values.len(), values.len()).qr().q();
+fn with_spectrum(random: &mut RandomNumbers, values: &[f64]) -> DMatrix<f64> {
+    let q = random.matrix(values.len(), values.len()).qr().q();
     let diagonal = DMatrix::from_diagonal(&values.to_vec().into());
     let matrix = &q * diagonal * q.transpose();
     0.5 * (&matrix + matrix.transpose())
@@ -153,14 +153,14 @@ fn with_spectrum(lottery: &mut Lottery, values: &[f64]) -> DMatrix<f64> {
 
 #[test]
 fn the_proof_agrees_with_eigenvalues_and_never_errs_on_the_wrong_side() {
-    let mut lottery = Lottery(7);
+    let mut random = RandomNumbers(7);
     for case in 0..400 {
-        let n = lottery.between(2, 12);
-        let mut values: Vec<f64> = (0..n).map(|_| 1.0 + lottery.number()).collect();
+        let n = random.between(2, 12);
+        let mut values: Vec<f64> = (0..n).map(|_| 1.0 + random.number()).collect();
         // The smallest eigenvalue, from clearly positive through zero to clearly negative.
         let exponent = -f64::from(case % 16);
         values[0] = 10_f64.powf(exponent) * if case % 2 == 0 { 1.0 } else { -1.0 };
-        let matrix = with_spectrum(&mut lottery, &values);
+        let matrix = with_spectrum(&mut random, &values);
         let smallest = matrix.clone().symmetric_eigenvalues().min();
         let proved = Enclosure::exact(matrix).is_positive_definite();
         // Eigenvalues are known to about n eps here, the proof needs some times that.
@@ -204,13 +204,13 @@ fn an_eigenvalue_one_rounding_below_zero_is_not_proved() {
 /// are multiplied exactly in 128 bits for comparison.
 #[test]
 fn an_enclosed_product_contains_the_exact_one() {
-    let mut lottery = Lottery(11);
+    let mut random = RandomNumbers(11);
     for _ in 0..200 {
-        let n = lottery.between(1, 8);
-        let integers = |lottery: &mut Lottery| -> Vec<i128> {
-            (0..n).map(|_| (lottery.number() * 9e15) as i128).collect()
+        let n = random.between(1, 8);
+        let integers = |random: &mut RandomNumbers| -> Vec<i128> {
+            (0..n).map(|_| (random.number() * 9e15) as i128).collect()
         };
-        let (row, column) = (integers(&mut lottery), integers(&mut lottery));
+        let (row, column) = (integers(&mut random), integers(&mut random));
         let exact: i128 = row.iter().zip(&column).map(|(x, y)| x * y).sum();
         let as_matrix = |values: &[i128], r, c| {
             Enclosure::exact(DMatrix::from_iterator(

@@ -9,18 +9,18 @@ mod random_plants;
 
 use common::{Channel, REFERENCES, plant, reference, scenario, state_based};
 use ftc_control::Controller;
-use ftc_design::apart::ENOUGH;
+use ftc_design::apart::LEAST_DEVIATIONS;
 use ftc_design::warnings::{self, Warning};
 use ftc_design::{Design, MODE_LENGTH};
 use ftc_plant::deviation::Deviation;
 use ftc_plant::scenario::{ModeInterval, Scenario, Waveform};
 use ftc_plant::{SwitchedPlant, TruePlant};
 use ftc_simulate::{PlantSimulator, Trajectory, Variant, run};
-use random_plants::Dice;
+use random_plants::RandomNumbers;
 
 /// Sum of the mean squares of a run's true errors.
 fn error(run: &Trajectory, tracked: &[usize]) -> f64 {
-    run.merits(tracked).iter().map(|m| m.truth.mse).sum()
+    run.merits(tracked).iter().map(|m| m.true_output.mse).sum()
 }
 
 /// The loop whose mode is found, and the same told the fault, and the mode one sample late.
@@ -61,9 +61,9 @@ fn the_papers_modes_are_found_while_both_sensors_are_faulty() {
 
 /// Random designs whose modes last 40 to 120 samples.
 fn designs(seed: u64, count: usize) -> Vec<Design> {
-    let mut dice = Dice::seeded(seed);
+    let mut random = RandomNumbers::seeded(seed);
     let draw = |_| {
-        let mut design = random_plants::with_several_sensors(&mut dice);
+        let mut design = random_plants::with_several_sensors(&mut random);
         let te = design.plant.sample_time;
         design.scenario.steps = 4000;
         let (mut at, mut schedule) = (0.0, Vec::new());
@@ -72,7 +72,7 @@ fn designs(seed: u64, count: usize) -> Vec<Design> {
                 from: at * te,
                 mode: schedule.len() % 2,
             });
-            at += dice.between(40.0, 120.0).round();
+            at += random.between(40.0, 120.0).round();
         }
         design.scenario.schedule = schedule;
         let settings = design.controller.estimator.hypotheses.as_mut().unwrap();
@@ -130,7 +130,7 @@ fn modes_of_random_plants_are_found() {
 fn modes_that_no_reading_tells_apart_are_named() {
     let mut design = designs(43, 1).remove(0);
     let apart = |design: &Design| ftc_design::apart::pairs(design)[0].deviations;
-    assert!(apart(&design) > 10.0 * ENOUGH);
+    assert!(apart(&design) > 10.0 * LEAST_DEVIATIONS);
     design.plant.modes[1] = design.plant.modes[0].clone();
     assert_eq!(apart(&design), 0.0);
     let named = warnings::of_design(&design, None);

@@ -8,7 +8,7 @@ mod random_plants;
 use ftc_control::Controller;
 use ftc_plant::scenario::ModeInterval;
 use ftc_simulate::{PlantSimulator, Variant, run};
-use random_plants::{Dice, STEPS, design};
+use random_plants::{RandomNumbers, STEPS, design};
 
 /// Plants; each runs for [`STEPS`] samples. `cargo bench --bench detection` counts on twenty.
 const PLANTS: usize = 4;
@@ -17,10 +17,10 @@ const EVERY: u64 = 5_000;
 
 #[test]
 fn no_healthy_sensor_is_flagged() {
-    let mut dice = Dice::seeded(71);
+    let mut random = RandomNumbers::seeded(71);
     let mut samples = 0;
     for plant in 0..PLANTS {
-        let mut design = design(&mut dice);
+        let mut design = design(&mut random);
         let te = design.plant.sample_time;
         design.scenario.schedule = (0..STEPS / EVERY)
             .map(|k| ModeInterval {

@@ -38,7 +38,7 @@ const WINDOWS: [(&str, f64, f64); 4] = [
 /// threshold beside what the disturbance does to that output, for which it can be taken, and has at
 /// every tick the sign that does most harm. The sum of the magnitudes of the uncompensated loop's
 /// response to a fault of one tick, times that size, is the bound.
-fn unseen(sensors: &[usize]) -> f64 {
+fn undetected(sensors: &[usize]) -> f64 {
     let thresholds = controller(Channel::State, 0.005).estimator.thresholds;
     let disturbed = disturbed();
     let healthy = quietly(&[]);
@@ -46,13 +46,13 @@ fn unseen(sensors: &[usize]) -> f64 {
     for &sensor in sensors {
         // In either mode, far from the switch.
         let worst = [200.0, 1200.0].map(|from| {
-            let blip = FaultEvent {
+            let one_sample = FaultEvent {
                 sensor,
                 from,
                 until: from + 1.0,
                 kind: FaultKind::Bias { size: 1.0 },
             };
-            let moved = quietly(&[blip]);
+            let moved = quietly(&[one_sample]);
             [0, 1].map(|output| {
                 let pairs = moved.records.iter().zip(&healthy.records);
                 pairs
@@ -126,8 +126,8 @@ fn judged(tick: u64) -> bool {
 #[test]
 fn every_kind_at_every_time_on_either_sensor_or_both() {
     for sensors in [&[0][..], &[1], &[0, 1]] {
-        let unseen = unseen(sensors);
-        println!("unseen faults on {sensors:?} move an output by up to {unseen:.3}");
+        let undetected = undetected(sensors);
+        println!("undetected faults on {sensors:?} move an output by up to {undetected:.3}");
         for &(name, kind) in KINDS {
             for (when, from, until) in WINDOWS {
                 let events: Vec<_> = sensors
@@ -147,7 +147,7 @@ fn every_kind_at_every_time_on_either_sensor_or_both() {
                     "{name} {when} on {sensors:?}: off by {off:.3}, without FTC by {uncompensated:.3}"
                 );
                 assert!(
-                    off < unseen,
+                    off < undetected,
                     "{name} {when} on {sensors:?}: off by {off:.3}"
                 );
                 let finite = tolerant.records.iter().all(|r| {
@@ -170,7 +170,7 @@ fn every_kind_at_every_time_on_either_sensor_or_both() {
 
 #[test]
 fn different_faults_overlap() {
-    let unseen = unseen(&[0, 1]);
+    let undetected = undetected(&[0, 1]);
     for &(first, kind) in KINDS {
         for &(second, other) in KINDS {
             let events = [
@@ -193,7 +193,7 @@ fn different_faults_overlap() {
                 judged,
             );
             println!("{first} under {second}: off by {off:.3}");
-            assert!(off < unseen, "{first} under {second}: off by {off:.3}");
+            assert!(off < undetected, "{first} under {second}: off by {off:.3}");
         }
     }
 }

@@ -1,7 +1,7 @@
 //! The method as a whole on the paper's scenario A: with a faulty sensor the true output
 //! is as good as with a controller that is told the fault.
 //!
-//! promise: told-the-fault
+//! promise: known-fault
 
 mod common;
 
@@ -19,7 +19,7 @@ fn true_error(trajectory: &Trajectory) -> f64 {
     trajectory
         .merits(&[0, 1])
         .iter()
-        .map(|merit| merit.truth.mse)
+        .map(|merit| merit.true_output.mse)
         .sum()
 }
 

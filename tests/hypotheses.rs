@@ -12,15 +12,15 @@ use ftc_plant::scenario::{ModeInterval, Waveform};
 use ftc_plant::{SwitchedPlant, TruePlant};
 use ftc_simulate::{PlantSimulator, Trajectory, Variant, run};
 use proptest::prelude::*;
-use random_plants::Dice;
+use random_plants::RandomNumbers;
 
 const STEPS: u64 = 1200;
 
 /// Random designs with at least two sensors, on a schedule with switches.
 fn designs(seed: u64, count: usize) -> Vec<Design> {
-    let mut dice = Dice::seeded(seed);
+    let mut random = RandomNumbers::seeded(seed);
     let draw = |_| {
-        let mut design = random_plants::with_several_sensors(&mut dice);
+        let mut design = random_plants::with_several_sensors(&mut random);
         let te = design.plant.sample_time;
         design.scenario.steps = STEPS;
         design.scenario.schedule = (0..6)
@@ -46,7 +46,7 @@ fn simulate(design: &Design, truth: &SwitchedPlant, variant: Variant) -> Traject
 
 fn true_error(design: &Design, run: &Trajectory) -> f64 {
     let merits = run.merits(&design.controller.feedback.tracked);
-    merits.iter().map(|merit| merit.truth.mse).sum()
+    merits.iter().map(|merit| merit.true_output.mse).sum()
 }
 
 fn ratio(design: &Design, truth: &SwitchedPlant, against: Variant) -> f64 {
@@ -66,7 +66,10 @@ fn both_sensors_of_the_papers_example_are_corrected_at_once() {
                 let plant = PlantSimulator::new(plant(channel), scenario);
                 let error = |variant| {
                     let merits = run(&plant, &controller, variant).merits(&[0, 1]);
-                    merits.iter().map(|merit| merit.truth.mse).sum::<f64>()
+                    merits
+                        .iter()
+                        .map(|merit| merit.true_output.mse)
+                        .sum::<f64>()
                 };
                 ratios.push(error(Variant::Ftc) / error(Variant::ToldTheFault));
             }
@@ -99,13 +102,13 @@ fn a_tuning_constant_of_the_record_decides() {
 /// One sensor jumps by 12 to 100 noise deviations, at the switch of the modes too; the others are right.
 #[test]
 fn an_abrupt_bias_is_taken_out() {
-    let mut dice = Dice::seeded(97);
+    let mut random = RandomNumbers::seeded(97);
     let mut told = Vec::new();
     for design in designs(17, 8) {
-        for from in [400.0, dice.between(100.0, 700.0)] {
+        for from in [400.0, random.between(100.0, 700.0)] {
             let mut design = design.clone();
             let te = design.plant.sample_time;
-            let size = random_plants::NOISE * 12.0 * (100.0f64 / 12.0).powf(dice.unit());
+            let size = random_plants::NOISE * 12.0 * (100.0f64 / 12.0).powf(random.unit());
             design.scenario.fault[0] = Waveform::Steps {
                 points: vec![[from * te, size], [(from + 300.0) * te, 0.0]],
             };

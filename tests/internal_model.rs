@@ -66,7 +66,7 @@ fn a_sine_is_followed_to_99_7_percent_and_with_the_internal_model_to_99_95() {
             )
             .merits(&[0, 1]);
             for merit in merits {
-                let vaf = merit.truth.vaf;
+                let vaf = merit.true_output.vaf;
                 println!("{channel:?}, {harmonics} harmonics: {vaf:.4} %");
                 assert!(vaf >= least, "{channel:?}, {harmonics} harmonics: {vaf}");
             }

@@ -5,7 +5,7 @@ mod plants;
 use ftc_design::lmi::{Affine, Inequality, Problem};
 use ftc_design::{BlockKind, BlockName};
 use nalgebra::DMatrix;
-use plants::Lottery;
+use plants::RandomNumbers;
 
 fn name(mode: usize) -> BlockName {
     BlockName::new(BlockKind::Lyapunov, mode, mode)
@@ -14,9 +14,9 @@ fn name(mode: usize) -> BlockName {
 /// `t I - A >= 0`: the least `t` is the largest eigenvalue.
 #[test]
 fn the_largest_eigenvalue_is_a_minimum() {
-    let mut lottery = Lottery(1);
+    let mut random = RandomNumbers(1);
     for n in 1..8 {
-        let root = lottery.matrix(n, n);
+        let root = random.matrix(n, n);
         let a = &root + root.transpose();
         let mut problem = Problem::new();
         let t = problem.scalar();
@@ -33,13 +33,13 @@ fn the_largest_eigenvalue_is_a_minimum() {
 /// operation of an expression takes part.
 #[test]
 fn products_and_transposes_mean_what_they_say() {
-    let mut lottery = Lottery(2);
+    let mut random = RandomNumbers(2);
     for _ in 0..10 {
-        let (rows, columns) = (lottery.between(1, 4), lottery.between(1, 4));
-        let wanted = lottery.matrix(rows, columns);
-        let left = DMatrix::identity(rows, rows) * 3.0 + lottery.matrix(rows, rows);
-        let right = DMatrix::identity(columns, columns) * 3.0 + lottery.matrix(columns, columns);
-        let other = 0.1 * lottery.matrix(columns, columns);
+        let (rows, columns) = (random.between(1, 4), random.between(1, 4));
+        let wanted = random.matrix(rows, columns);
+        let left = DMatrix::identity(rows, rows) * 3.0 + random.matrix(rows, rows);
+        let right = DMatrix::identity(columns, columns) * 3.0 + random.matrix(columns, columns);
+        let other = 0.1 * random.matrix(columns, columns);
         let target = &left * &wanted * &right + (&other * wanted.transpose()).transpose();
 
         let mut problem = Problem::new();
@@ -65,10 +65,10 @@ fn products_and_transposes_mean_what_they_say() {
 /// the multipliers add up to one.
 #[test]
 fn the_margin_decides_stability() {
-    let mut lottery = Lottery(3);
+    let mut random = RandomNumbers(3);
     for case in 0..40 {
-        let n = lottery.between(1, 5);
-        let shape = lottery.matrix(n, n);
+        let n = random.between(1, 5);
+        let shape = random.matrix(n, n);
         let radius = ftc_plant::spectral_radius(&shape);
         let wanted = if case % 2 == 0 { 0.97 } else { 1.03 };
         let a = shape * (wanted / radius);
@@ -115,8 +115,8 @@ fn a_contradiction_is_shared_by_those_who_cause_it() {
 #[test]
 fn solving_is_deterministic() {
     let solve = || {
-        let mut lottery = Lottery(9);
-        let a = 0.5 * lottery.matrix(4, 4);
+        let mut random = RandomNumbers(9);
+        let a = 0.5 * random.matrix(4, 4);
         let mut problem = Problem::new();
         let p = problem.symmetric(4);
         let next = &a * &p;
@@ -138,15 +138,15 @@ fn solving_is_deterministic() {
 /// observer's inequalities, feasible or not.
 #[test]
 fn both_solvers_find_the_same_margin() {
-    let mut lottery = Lottery(17);
+    let mut random = RandomNumbers(17);
     let mut infeasible = 0;
     for case in 0..30 {
-        let (n, p) = (lottery.between(1, 5), lottery.between(1, 3));
-        let shape = lottery.matrix(n, n);
+        let (n, p) = (random.between(1, 5), random.between(1, 3));
+        let shape = random.matrix(n, n);
         let a = &shape * (1.4 / ftc_plant::spectral_radius(&shape));
         let c = match case % 3 {
             0 => DMatrix::zeros(p, n),
-            _ => lottery.matrix(p, n),
+            _ => random.matrix(p, n),
         };
         let mut problem = Problem::new();
         let (lyapunov, injection) = (problem.symmetric(n), problem.full(n, p));

@@ -97,7 +97,7 @@ fn a_changed_gain_for_lost_sensors_is_refused() {
     let second_column = gain.nrows();
     gain.as_mut_slice()[second_column] = 1e3;
     assert!(wild.verify(&plant).is_err());
-    let mut hasty = found;
-    hasty.observer.lost.as_mut().unwrap().mu = 2.0;
-    assert!(hasty.verify(&plant).is_err());
+    let mut too_large = found;
+    too_large.observer.lost.as_mut().unwrap().mu = 2.0;
+    assert!(too_large.verify(&plant).is_err());
 }

@@ -96,7 +96,7 @@ fn ratios(method: EstimatorMethod) -> Vec<f64> {
                         run(&simulator, &controller, variant)
                             .merits(&[0, 1])
                             .iter()
-                            .map(|m| m.truth.mse)
+                            .map(|m| m.true_output.mse)
                             .sum()
                     };
                     found.push(error(Variant::Ftc) / error(Variant::ToldTheFault));

@@ -1,7 +1,8 @@
-"""Every file and symbol that CONTRIBUTING.md and ARCHITECTURE.md name in back-quotes is there.
+"""Every file and symbol that CONTRIBUTING.md and ARCHITECTURE.md name in back-quotes is there; names are the field's.
 
 A file may be named by the end of its path; one that the program writes is named by the sources. A symbol
-named in a numbered step must stand in a file that the step names; any other, somewhere in the sources.
+named in a numbered step must stand in a file that the step names; any other, somewhere in the sources. Names and
+phrases that were metaphors, and were replaced by terms of the field, must not come back.
 """
 
 from __future__ import annotations
@@ -16,6 +17,11 @@ ROOT = Path(__file__).parents[1]
 GUIDES = ("CONTRIBUTING.md", "ARCHITECTURE.md")
 STEP = re.compile(r"^\d+\. .*(?:\n {3}.*)*", re.MULTILINE)
 FILE = re.compile(r"[\w*./-]*/[\w*.-]*|[\w*-]+\.(?:rs|py|sh|md|toml|json)|Makefile")
+# Metaphors that names, comments and messages once held.
+METAPHORS = re.compile(
+    rb"\b(?:Dice|dice|Lottery|lottery|hasty|blip|bearable|SILENCE|ROOM|HASTE|Road|Contender|slowest_step|thickened"
+    rb"|Trust|Truth|lives on|leans on|hair of the|beyond suspicion|usual ways out|fault that hides)\b"
+)
 SYMBOL = re.compile(r"[A-Za-z_]\w*(?:::\w+)*")
 
 
@@ -42,6 +48,11 @@ def main() -> None:
             for name in (name for name in named if SYMBOL.fullmatch(name) and not FILE.fullmatch(name)):
                 missing = [piece for piece in name.split("::") if piece.encode() not in known]
                 wrong += [f"{guide}: no {piece} (of {name}) in what is named beside it" for piece in missing]
+    sources = [name for name in files if name.endswith((".rs", ".py", ".c")) and ROOT / name != Path(__file__)]
+    for name in sources:
+        for number, line in enumerate(texts[name].splitlines(), 1):
+            if found := METAPHORS.search(line):
+                wrong.append(f"{name}:{number}: say '{found[0].decode()}' in a term of the field")
     if wrong:
         sys.exit("\n".join(wrong))
 

@@ -14,6 +14,7 @@ pub struct Span {
 
 impl Span {
     /// The positions of the elements in the table.
+    #[inline]
     pub fn range(self) -> std::ops::Range<usize> {
         self.first as usize..self.first as usize + self.len as usize
     }

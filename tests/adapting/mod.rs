@@ -1,7 +1,7 @@
 //! Loops with and without adaptation, on plants that may have changed, under random faults.
 #![allow(dead_code, missing_docs)]
 
-use crate::random_plants::{Dice, design};
+use crate::random_plants::{RandomNumbers, design};
 use ftc_control::Controller;
 use ftc_design::Design;
 use ftc_plant::TruePlant;
@@ -11,7 +11,7 @@ use ftc_simulate::{PlantSimulator, Trajectory, Variant, run};
 pub const STEPS: u64 = 6000;
 
 /// Six faults of random kind, sensor, size and time.
-pub fn with_faults(design: &mut Design, dice: &mut Dice) {
+pub fn with_faults(design: &mut Design, random: &mut RandomNumbers) {
     let te = design.plant.sample_time;
     let sensors = design.controller.estimator.thresholds.len();
     design.scenario.steps = STEPS;
@@ -23,10 +23,10 @@ pub fn with_faults(design: &mut Design, dice: &mut Dice) {
         .collect();
     design.scenario.events = (0..6)
         .map(|_| {
-            let sensor = dice.count(0, sensors - 1);
-            let size = design.controller.estimator.thresholds[sensor] * dice.between(-20.0, 20.0);
-            let from = dice.between(600.0, 5400.0);
-            let kind = match dice.count(0, 3) {
+            let sensor = random.count(0, sensors - 1);
+            let size = design.controller.estimator.thresholds[sensor] * random.between(-20.0, 20.0);
+            let from = random.between(600.0, 5400.0);
+            let kind = match random.count(0, 3) {
                 0 => FaultKind::Bias { size },
                 1 => FaultKind::Drift {
                     slope: size / (100.0 * te),
@@ -40,7 +40,7 @@ pub fn with_faults(design: &mut Design, dice: &mut Dice) {
             FaultEvent {
                 sensor,
                 from: from * te,
-                until: (from + dice.between(50.0, 600.0)) * te,
+                until: (from + random.between(50.0, 600.0)) * te,
                 kind,
             }
         })
@@ -62,7 +62,7 @@ pub fn simulate(design: &Design, adapt: bool, variant: Variant) -> Trajectory {
 /// Sum of the true mean square errors.
 pub fn error(design: &Design, run: &Trajectory) -> f64 {
     let tracked = &design.controller.feedback.tracked;
-    run.merits(tracked).iter().map(|m| m.truth.mse).sum()
+    run.merits(tracked).iter().map(|m| m.true_output.mse).sum()
 }
 
 /// Beyond this an output counts as lost.
@@ -112,11 +112,11 @@ pub fn scale_thresholds(design: &mut Design, factor: f64) {
 
 /// A random plant whose input gains are off by `gain`, with thresholds opened tenfold and faults of up to
 /// `largest` thresholds; none where the loop itself does not bear the change.
-pub fn changed_plant(dice: &mut Dice, gain: f64, largest: f64) -> Option<Design> {
-    let mut design = design(dice);
+pub fn changed_plant(random: &mut RandomNumbers, gain: f64, largest: f64) -> Option<Design> {
+    let mut design = design(random);
     // Faults are drawn up to twenty thresholds.
     scale_thresholds(&mut design, largest / 2.0);
-    with_faults(&mut design, dice);
+    with_faults(&mut design, random);
     scale_thresholds(&mut design, 20.0 / largest);
     change_gains(&mut design, gain);
     tolerates(&design).then_some(design)

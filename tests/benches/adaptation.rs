@@ -8,7 +8,7 @@ mod adapting;
 mod random_plants;
 
 use adapting::{changed_plant, errors};
-use random_plants::Dice;
+use random_plants::RandomNumbers;
 
 const PLANTS: usize = 25;
 
@@ -21,8 +21,8 @@ fn main() {
     for seed in 31..=36 {
         let gain = if seed % 2 == 0 { 0.97 } else { 1.03 };
         let largest = faults[(seed as usize - 31) / 2];
-        let mut dice = Dice::seeded(seed);
-        let plants = std::iter::repeat_with(|| changed_plant(&mut dice, gain, largest));
+        let mut random = RandomNumbers::seeded(seed);
+        let plants = std::iter::repeat_with(|| changed_plant(&mut random, gain, largest));
         let errors: Vec<[Option<f64>; 2]> = plants
             .flatten()
             .take(PLANTS)

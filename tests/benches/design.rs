@@ -16,28 +16,32 @@ use std::time::Instant;
 /// Designs up to this many states are timed on three plants, larger ones on one.
 const SMALL: usize = 4;
 
-fn matrix(dice: &mut ChaCha8Rng, rows: usize, columns: usize) -> DMatrix<f64> {
+fn matrix(random: &mut ChaCha8Rng, rows: usize, columns: usize) -> DMatrix<f64> {
     DMatrix::from_fn(rows, columns, |_, _| {
-        2.0 * (dice.next_u64() >> 11) as f64 / (1u64 << 53) as f64 - 1.0
+        2.0 * (random.next_u64() >> 11) as f64 / (1u64 << 53) as f64 - 1.0
     })
 }
 
 /// Modes that are variations of one plant, so that one guarantee can serve them all.
-fn plant(dice: &mut ChaCha8Rng, n: usize, modes: usize) -> SwitchedPlant {
+fn plant(random: &mut ChaCha8Rng, n: usize, modes: usize) -> SwitchedPlant {
     let (m, p) = (n.div_ceil(2), n.div_ceil(2));
-    let a = matrix(dice, n, n);
+    let a = matrix(random, n, n);
     let a = &a * (0.8 / spectral_radius(&a));
-    let (b, c, e) = (matrix(dice, n, m), matrix(dice, p, n), matrix(dice, n, 1));
-    let mode = |dice: &mut ChaCha8Rng| {
+    let (b, c, e) = (
+        matrix(random, n, m),
+        matrix(random, p, n),
+        matrix(random, n, 1),
+    );
+    let mode = |random: &mut ChaCha8Rng| {
         Mode::new(
-            &a + 0.02 * matrix(dice, n, n),
-            &b + 0.02 * matrix(dice, n, m),
+            &a + 0.02 * matrix(random, n, n),
+            &b + 0.02 * matrix(random, n, m),
             c.clone(),
         )
         .named("random")
         .with_disturbance(e.clone(), DMatrix::zeros(p, 1))
     };
-    SwitchedPlant::new(1.0, (0..modes).map(|_| mode(dice)).collect())
+    SwitchedPlant::new(1.0, (0..modes).map(|_| mode(random)).collect())
 }
 
 /// Seconds of one design, and what came of it.
@@ -72,9 +76,9 @@ fn main() {
         let plants = if n <= SMALL { 3 } else { 1 };
         for modes in [2, 4] {
             for lyapunov in [Lyapunov::Common, Lyapunov::Switched, Lyapunov::Dwell] {
-                let mut dice = ChaCha8Rng::seed_from_u64((10 * n + modes) as u64);
+                let mut random = ChaCha8Rng::seed_from_u64((10 * n + modes) as u64);
                 let mut runs: Vec<(f64, &str)> = (0..plants)
-                    .map(|_| timed(&plant(&mut dice, n, modes), lyapunov))
+                    .map(|_| timed(&plant(&mut random, n, modes), lyapunov))
                     .collect();
                 runs.sort_by(|x, y| x.0.total_cmp(&y.0));
                 let seconds = runs[plants / 2].0;

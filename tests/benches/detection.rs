@@ -9,7 +9,7 @@ use ftc_control::Controller;
 use ftc_design::Design;
 use ftc_plant::scenario::{FaultEvent, FaultKind, ModeInterval};
 use ftc_simulate::{PlantSimulator, Variant, run};
-use random_plants::{Dice, design};
+use random_plants::{RandomNumbers, design};
 
 const PLANTS: usize = 20;
 const FAULTS_PER_PLANT: usize = 10;
@@ -53,8 +53,13 @@ fn healthy(design: &Design, tally: &mut Tally) {
         .count() as u64;
 }
 
-fn kind(dice: &mut Dice, index: usize, te: f64, threshold: f64) -> (&'static str, FaultKind) {
-    let size = threshold * dice.between(3.0, 20.0);
+fn kind(
+    random: &mut RandomNumbers,
+    index: usize,
+    te: f64,
+    threshold: f64,
+) -> (&'static str, FaultKind) {
+    let size = threshold * random.between(3.0, 20.0);
     match index % 5 {
         0 => ("bias", FaultKind::Bias { size }),
         1 => (
@@ -75,17 +80,17 @@ fn kind(dice: &mut Dice, index: usize, te: f64, threshold: f64) -> (&'static str
     }
 }
 
-fn faulty(design: &Design, dice: &mut Dice, index: usize, tally: &mut Tally) {
+fn faulty(design: &Design, random: &mut RandomNumbers, index: usize, tally: &mut Tally) {
     let te = design.plant.sample_time;
     let sensors = design.controller.estimator.thresholds.len();
-    let sensor = dice.count(0, sensors - 1);
+    let sensor = random.count(0, sensors - 1);
     let hold = design.controller.estimator.response_length as u64;
-    let from = 2 * hold + 1000 + dice.count(0, 400) as u64;
+    let from = 2 * hold + 1000 + random.count(0, 400) as u64;
     let until = from + 600;
     let mut scenario = design.scenario.clone();
     scenario.steps = until + 200;
     let (name, kind) = kind(
-        dice,
+        random,
         index,
         te,
         design.controller.estimator.thresholds[sensor],
@@ -131,13 +136,13 @@ fn faulty(design: &Design, dice: &mut Dice, index: usize, tally: &mut Tally) {
 }
 
 fn main() {
-    let mut dice = Dice::seeded(2026);
+    let mut random = RandomNumbers::seeded(2026);
     let mut tally = Tally::default();
     for plant in 0..PLANTS {
-        let design = design(&mut dice);
+        let design = design(&mut random);
         healthy(&design, &mut tally);
         for fault in 0..FAULTS_PER_PLANT {
-            faulty(&design, &mut dice, plant + fault, &mut tally);
+            faulty(&design, &mut random, plant + fault, &mut tally);
         }
     }
     println!(

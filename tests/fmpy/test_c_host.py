@@ -1,8 +1,4 @@
-"""A C program drives the exported FMUs: nothing depends on Rust or Python.
-
-promise: independent-instances
-promise: memory-safety
-"""
+"""A C program drives the exported FMUs: nothing depends on Rust or Python."""
 
 from __future__ import annotations
 
@@ -33,14 +29,20 @@ def test_every_life_of_an_instance(
 
 
 def test_eight_threads_at_once(tmp_path: Path, example_case: Callable[[str], Case]) -> None:
-    """Loops in eight threads give the bits of one by itself."""
+    """Loops in eight threads give the bits of one by itself.
+
+    promise: independent-instances
+    """
     assert c_host.close_in_threads(example_case("paper").fmus, tmp_path).startswith("8 threads")
 
 
 @pytest.mark.skipif(shutil.which("valgrind") is None, reason="valgrind watches the memory")
 @pytest.mark.parametrize("which", ["controller", "plant"])
 def test_no_bad_access_and_no_leak(tmp_path: Path, example_case: Callable[[str], Case], which: str) -> None:
-    """Memcheck, which ends with an error for either, has nothing to say of the whole run."""
+    """Memcheck, which ends with an error for either, has nothing to say of the whole run.
+
+    promise: memory-safety
+    """
     fmu = getattr(example_case("paper").fmus, which)
     lines = c_host.drive(c_host.build(tmp_path), fmu, count=c_host.STEPS, under=c_host.MEMCHECK)
     assert len(lines.splitlines()) == c_host.STEPS

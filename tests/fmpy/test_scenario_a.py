@@ -1,6 +1,6 @@
 """Scenario A, the promise in numbers: with FTC as good as knowing the fault, without it ten times worse.
 
-promise: told-the-fault
+promise: known-fault
 """
 
 from __future__ import annotations

@@ -1,8 +1,4 @@
-"""What is in an exported archive, whoever opens it.
-
-promise: reproducible-export
-promise: licences
-"""
+"""What is in an exported archive, whoever opens it."""
 
 from __future__ import annotations
 
@@ -21,7 +17,10 @@ if TYPE_CHECKING:
 
 
 def test_the_same_design_gives_the_same_bytes(example_case: Callable[[str], Case], tmp_path: Path) -> None:
-    """Two exports of one design are equal to the byte, the package too."""
+    """Two exports of one design are equal to the byte, the package too.
+
+    promise: reproducible-export
+    """
     case = example_case("paper_latency")
     again = commands.export(case.path, tmp_path)
     for name in ("controller", "plant", "package"):
@@ -29,7 +28,10 @@ def test_the_same_design_gives_the_same_bytes(example_case: Callable[[str], Case
 
 
 def test_an_fmu_brings_its_papers(example_case: Callable[[str], Case]) -> None:
-    """Each FMU holds a page about its design, licences and an icon, and no path leads out of it."""
+    """Each FMU holds a page about its design, licences and an icon, and no path leads out of it.
+
+    promise: reproducible-export
+    """
     case = example_case("paper_latency")
     for fmu in (case.fmus.controller, case.fmus.plant):
         with zipfile.ZipFile(fmu) as archive:
@@ -53,7 +55,10 @@ def test_an_fmu_brings_its_papers(example_case: Callable[[str], Case]) -> None:
 
 
 def test_every_linked_crate_brings_its_licence(example_case: Callable[[str], Case]) -> None:
-    """Each crate whose code left its name in the binary is listed, with a licence text; the standard library too."""
+    """Each crate whose code left its name in the binary is listed, with a licence text; the standard library too.
+
+    promise: licences
+    """
     case = example_case("paper_latency")
     for fmu in (case.fmus.controller, case.fmus.plant):
         with zipfile.ZipFile(fmu) as archive:
@@ -82,7 +87,10 @@ def test_every_linked_crate_brings_its_licence(example_case: Callable[[str], Cas
 
 
 def test_no_path_of_the_building_machine_is_in_a_binary(example_case: Callable[[str], Case]) -> None:
-    """Neither the repository's folder nor cargo's nor the home directory stands in the binaries."""
+    """Neither the repository's folder nor cargo's nor the home directory stands in the binaries.
+
+    promise: licences
+    """
     case = example_case("paper_latency")
     places = [Path(__file__).parents[2], Path.home(), Path(os.environ.get("CARGO_HOME", Path.home() / ".cargo"))]
     for fmu in (case.fmus.controller, case.fmus.plant):

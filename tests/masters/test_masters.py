@@ -1,8 +1,4 @@
-"""The loop in several masters that step both FMUs at once: one sample of delay, designed for.
-
-promise: other-masters
-promise: ssp-package
-"""
+"""The loop in several masters that step both FMUs at once: one sample of delay, designed for."""
 
 from __future__ import annotations
 
@@ -33,14 +29,21 @@ def _assert_native(loop: masters.Loop, case: Case) -> None:
 
 @EACH_MASTER
 def test_the_paper_with_one_sample_of_delay(example_case: Callable[[str], Case], master: str) -> None:
-    """Every master gives the native run of the design that allows for the delay."""
+    """Every master gives the native run of the design that allows for the delay.
+
+    promise: other-masters
+    promise: ssp-package
+    """
     case = example_case("paper_latency")
     _assert_native(masters.ALL[master](case.fmus, case.run.trajectories.ticks - 1), case)
 
 
 @pytest.mark.parametrize("of", sizes.ALL, ids=str)
 def test_designs_of_all_sizes(make_case: Callable[[dict], Case], of: sizes.Sizes) -> None:
-    """The toolbox finds nothing to say against ten pairs of all sizes, and every master runs them."""
+    """The toolbox finds nothing to say against ten pairs of all sizes, and every master runs them.
+
+    promise: other-masters
+    """
     case = make_case(sizes.design(of, latency=1))
     assert masters.toolbox_errors(case.fmus.controller) == []
     assert masters.toolbox_errors(case.fmus.plant) == []
@@ -49,7 +52,10 @@ def test_designs_of_all_sizes(make_case: Callable[[dict], Case], of: sizes.Sizes
 
 
 def test_the_delay_is_harmless_where_it_was_designed_for(example_case: Callable[[str], Case]) -> None:
-    """The true outputs follow their references as well as in the native run, to within 5 %."""
+    """The true outputs follow their references as well as in the native run, to within 5 %.
+
+    promise: other-masters
+    """
     case = example_case("paper_latency")
     native = case.run.trajectories
     loop = masters.run_fmpy(case.fmus, native.ticks, masters.Schedule(parallel=True))
@@ -63,7 +69,10 @@ def test_the_delay_is_harmless_where_it_was_designed_for(example_case: Callable[
 
 
 def test_a_delay_that_was_not_designed_for_costs(example_case: Callable[[str], Case]) -> None:
-    """The design without delay, stepped in parallel, does worse than it was designed to."""
+    """The design without delay, stepped in parallel, does worse than it was designed to.
+
+    promise: other-masters
+    """
     case = example_case("paper")
     loop = masters.run_fmpy(case.fmus, case.run.trajectories.ticks, masters.Schedule(parallel=True))
     native = case.run.trajectories

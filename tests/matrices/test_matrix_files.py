@@ -197,12 +197,12 @@ def test_continuous_matrices_are_sampled_as_scipy_does(tmp_path: Path) -> None:
 def test_a_damaged_file_is_refused_in_one_sentence(save: Callable[[dict, Path], None], tmp_path: Path) -> None:
     """Whatever bytes are wrong, whoever reads them: one sentence or a design, and no trace of a panic."""
     save(MODEL, tmp_path / "plant.mat")
-    sound = (tmp_path / "plant.mat").read_bytes()
+    intact = (tmp_path / "plant.mat").read_bytes()
     design = tmp_path / "design.toml"
     design.write_text(TOP + '[[mode]]\nfile = "plant.mat"\n' + REST)
     generator = np.random.default_rng(11)
     for _ in range(60):
-        damaged = bytearray(sound)
+        damaged = bytearray(intact)
         for _ in range(generator.integers(1, 6)):
             damaged[generator.integers(128, len(damaged))] = generator.integers(256)
         (tmp_path / "plant.mat").write_bytes(

@@ -67,9 +67,9 @@ pub fn paper_spec(latency: usize, decay: f64, lyapunov: Lyapunov) -> ControlSpec
 }
 
 /// A linear congruential generator: reproducible anywhere, good enough for matrices.
-pub struct Lottery(pub u64);
+pub struct RandomNumbers(pub u64);
 
-impl Lottery {
+impl RandomNumbers {
     /// A number in [-1, 1).
     pub fn number(&mut self) -> f64 {
         self.0 = self
@@ -93,23 +93,23 @@ impl Lottery {
 /// A plant of one to three similar modes, sampled from continuous time: `A = I + Te Ac`, where `Ac`
 /// has its spectrum around -2 and may reach into the right half plane.
 pub fn random_plant(seed: u64, sample_time: f64) -> SwitchedPlant {
-    let mut lottery = Lottery(seed.wrapping_mul(0x9E3779B97F4A7C15) + 1);
-    let n = lottery.between(2, 4);
-    let m = lottery.between(1, 3);
-    let p = lottery.between(1, 3);
-    let s = lottery.between(1, p);
-    let modes = lottery.between(1, 3);
+    let mut random = RandomNumbers(seed.wrapping_mul(0x9E3779B97F4A7C15) + 1);
+    let n = random.between(2, 4);
+    let m = random.between(1, 3);
+    let p = random.between(1, 3);
+    let s = random.between(1, p);
+    let modes = random.between(1, 3);
     let (a, b, c) = (
-        2.0 * lottery.matrix(n, n) - 1.5 * DMatrix::identity(n, n),
-        lottery.matrix(n, m),
-        lottery.matrix(p, n),
+        2.0 * random.matrix(n, n) - 1.5 * DMatrix::identity(n, n),
+        random.matrix(n, m),
+        random.matrix(p, n),
     );
-    let e = lottery.matrix(n, s);
+    let e = random.matrix(n, s);
     let modes = (0..modes)
         .map(|_| {
             mode(
-                DMatrix::identity(n, n) + sample_time * (&a + 0.2 * lottery.matrix(n, n)),
-                sample_time * (&b + 0.1 * lottery.matrix(n, m)),
+                DMatrix::identity(n, n) + sample_time * (&a + 0.2 * random.matrix(n, n)),
+                sample_time * (&b + 0.1 * random.matrix(n, m)),
                 c.clone(),
                 sample_time * &e,
                 DMatrix::zeros(p, s),
@@ -292,21 +292,21 @@ pub fn half_unstable() -> SwitchedPlant {
 /// A plant of one to five states whose modes are variations of one another, some of them unstable; each
 /// state is disturbed with a chance of one half.
 pub fn sparsely_disturbed(seed: u64) -> SwitchedPlant {
-    let mut lottery = Lottery(seed.wrapping_mul(0x9E3779B97F4A7C15) + 7);
-    let n = lottery.between(1, 5);
-    let (m, p) = (lottery.between(1, 3), lottery.between(1, n.min(3)));
+    let mut random = RandomNumbers(seed.wrapping_mul(0x9E3779B97F4A7C15) + 7);
+    let n = random.between(1, 5);
+    let (m, p) = (random.between(1, 3), random.between(1, n.min(3)));
     let (a, b, c) = (
-        lottery.matrix(n, n),
-        lottery.matrix(n, m),
-        lottery.matrix(p, n),
+        random.matrix(n, n),
+        random.matrix(n, m),
+        random.matrix(p, n),
     );
-    let e = lottery.matrix(n, 1).map(|value| value.max(0.0));
-    let modes = lottery.between(1, 3);
+    let e = random.matrix(n, 1).map(|value| value.max(0.0));
+    let modes = random.between(1, 3);
     let variation = |_| {
-        let own = &a + 0.1 * lottery.matrix(n, n);
-        let radius = 0.75 + 0.25 * lottery.number();
+        let own = &a + 0.1 * random.matrix(n, n);
+        let radius = 0.75 + 0.25 * random.number();
         let scale = radius / ftc_plant::spectral_radius(&own);
-        let input = &b + 0.1 * lottery.matrix(n, m);
+        let input = &b + 0.1 * random.matrix(n, m);
         mode(
             own * scale,
             input,

@@ -17,9 +17,9 @@ pub const STEPS: u64 = 50_000;
 pub const NOISE: f64 = 0.003;
 
 /// Seeded randomness.
-pub struct Dice(ChaCha8Rng);
+pub struct RandomNumbers(ChaCha8Rng);
 
-impl Dice {
+impl RandomNumbers {
     pub fn seeded(seed: u64) -> Self {
         Self(ChaCha8Rng::seed_from_u64(seed))
     }
@@ -37,27 +37,27 @@ impl Dice {
     }
 }
 
-fn mode(dice: &mut Dice, n: usize, m: usize, p: usize, output: &DMatrix<f64>) -> Mode {
-    let a = dice.matrix(n, n);
+fn mode(random: &mut RandomNumbers, n: usize, m: usize, p: usize, output: &DMatrix<f64>) -> Mode {
+    let a = random.matrix(n, n);
     let radius = spectral_radius(&a).max(1e-3);
     Mode::new(
-        a * (dice.between(0.3, 0.85) / radius),
-        dice.matrix(n, m),
+        a * (random.between(0.3, 0.85) / radius),
+        random.matrix(n, m),
         output.clone(),
     )
     .named("random")
-    .with_disturbance(dice.matrix(n, 1) * 0.3, DMatrix::zeros(p, 1))
+    .with_disturbance(random.matrix(n, 1) * 0.3, DMatrix::zeros(p, 1))
 }
 
 /// A random plant with a certified design; draws until one exists.
-pub fn design(dice: &mut Dice) -> Design {
-    design_with(dice, EstimatorMethod::Reference)
+pub fn design(random: &mut RandomNumbers) -> Design {
+    design_with(random, EstimatorMethod::Reference)
 }
 
 /// The same with the state-based estimator and at least two sensors.
-pub fn with_several_sensors(dice: &mut Dice) -> Design {
+pub fn with_several_sensors(random: &mut RandomNumbers) -> Design {
     loop {
-        let design = design_with(dice, EstimatorMethod::Observer);
+        let design = design_with(random, EstimatorMethod::Observer);
         if design.plant.dimensions().outputs > 1 {
             return design;
         }
@@ -65,13 +65,13 @@ pub fn with_several_sensors(dice: &mut Dice) -> Design {
 }
 
 /// The same with an estimator of one's choice.
-pub fn design_with(dice: &mut Dice, method: EstimatorMethod) -> Design {
+pub fn design_with(random: &mut RandomNumbers, method: EstimatorMethod) -> Design {
     loop {
-        let (n, m, p) = (dice.count(1, 5), dice.count(1, 3), dice.count(1, 3));
-        let output = dice.matrix(p, n);
+        let (n, m, p) = (random.count(1, 5), random.count(1, 3), random.count(1, 3));
+        let output = random.matrix(p, n);
         let plant = SwitchedPlant::new(
-            dice.between(0.01, 1.0),
-            (0..2).map(|_| mode(dice, n, m, p, &output)).collect(),
+            random.between(0.01, 1.0),
+            (0..2).map(|_| mode(random, n, m, p, &output)).collect(),
         );
         let dims = plant.dimensions();
         let r = p.min(m).min(n);
@@ -82,10 +82,10 @@ pub fn design_with(dice: &mut Dice, method: EstimatorMethod) -> Design {
         control.output_weight = vec![1.0; r];
         control.integral_weight = vec![0.3 / plant.sample_time; r];
         control.input_weight = vec![0.3; m];
-        let period = dice.between(40.0, 300.0) * plant.sample_time;
-        let seed = dice.0.next_u64();
+        let period = random.between(40.0, 300.0) * plant.sample_time;
+        let seed = random.0.next_u64();
         let reference = (0..r).map(|_| Waveform::Square {
-            amplitude: dice.between(0.2, 0.8),
+            amplitude: random.between(0.2, 0.8),
             period: 400.0 * plant.sample_time,
             offset: 0.0,
         });

@@ -293,7 +293,7 @@ class Bank:
         kept: list[Candidate] = []
         plain = False
         for c in candidates:
-            is_plain = not c.flagged and not c.loose
+            is_plain = not c.flagged and not c.loose and bool(c.convinced)
             stays = c.score >= most - margin and len(kept) < self.tuning["kept"] - (not plain)
             if not stays and (plain or not is_plain):
                 continue
@@ -581,9 +581,9 @@ class Proposals:
     def _run_seen(self, run: OwnRun, drifted: frozenset[int]) -> Seen:
         """What the sample says if no load acts and these sensors have drifted."""
         valid = self.reading.valid
-        opened = np.array([self.fault_size[q] if q in drifted else 0.0 for q in range(self.at.p)])
-        S = run.covariance * np.outer(valid, valid) + np.diag(np.where(valid, self.reading.noise**2, 1.0))
-        S = S + np.diag(np.where(valid, opened**2, 0.0))
+        opened = np.array([self._opened(q, drifted) for q in range(self.at.p)])
+        own = np.where(valid, self.reading.noise**2 + opened, 1.0)
+        S = run.covariance * np.outer(valid, valid) + np.diag(own)
         return Seen(np.where(valid, self.reading.y - run.y, 0.0), S, run.y)
 
     def _put_back(self, name: str, run: OwnRun, drifted: frozenset[int], *, score: float, convinced: bool) -> None:
@@ -591,6 +591,9 @@ class Proposals:
         candidate.misfit_price = -2.0 * self.price["fault"]
         candidate.make = lambda: self._at_run(run, drifted)
         self.list.append(candidate)
+
+    def _opened(self, q: int, drifted: frozenset[int]) -> float:
+        return self.fault_size[q] ** 2 if q in drifted else self._healthy_variance(q)
 
     def _at_run(self, run: OwnRun, drifted: frozenset[int]) -> Hypothesis:
         """Returns the hypothesis put back to a run of the model: its state, its loads, no other faults."""
@@ -605,7 +608,7 @@ class Proposals:
         for k, mean in zip(at.gain, run.gains, strict=True):
             child.open(k, mean, left * self.bank.settings["gain_error"] ** 2)
         for q, k in enumerate(at.fault):
-            child.open(k, 0.0, self.fault_size[q] ** 2 if q in drifted else self._healthy_variance(q))
+            child.open(k, 0.0, self._opened(q, drifted))
         return child
 
     def _drifted(self) -> None:

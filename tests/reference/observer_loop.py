@@ -129,12 +129,12 @@ def close(
         noise: Of each sensor, one row per sample.
         regulator: What closes it.
         spoil: Changes the readings of a sample on their way.
-        push: What acts on the state over a sample beside the model.
+        push: What acts on the state over a sample beside the model; over sample -1, how far from rest it begins.
     """
     loop = reference_loop.Loop(design, noise)
     te = record.sample_time(design)
     mode = loop.signals(0)[0]
-    x = loop.true_modes[mode].x0
+    x = loop.true_modes[mode].x0 + (push(-1) if push else 0.0)
     sensors = scenario.Sensors(design["scenario"]["events"], loop.true_modes[mode].y0.copy())
     for tick in range(len(noise)):
         mode, y_ref, w, additive = loop.signals(tick)

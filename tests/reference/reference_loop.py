@@ -92,7 +92,7 @@ def disturbance_response(mode: record.Mode, angle: float) -> np.ndarray:
 
 
 @dataclass
-class Trust:
+class Validity:
     """How much a residual says: by how much thresholds widen, whether it clears, whether it teaches."""
 
     widening: float
@@ -184,7 +184,7 @@ class Estimator:
         """Predicts the output, takes the residual, decides sensor by sensor and learns when all are healthy."""
         present = np.isfinite(y)
         if not self.enabled:
-            self._decide(present, trust=None)
+            self._decide(present, validity=None)
             return
         phi = np.concatenate([u - self.modes[mode].u0 for u in self.past[-self.length :]])
         undisturbed = self.modes[mode].y0 + self.responses[mode] @ phi
@@ -199,8 +199,8 @@ class Estimator:
         deviation = np.array(self.settings["predictors"][mode]["deviation"])
         precise = math.sqrt(distance) * deviation <= 0.01 * np.abs(self.y_hat - self.modes[mode].y0)
         self.judged = (self.hold == 0) & (precise | (distance <= limit))
-        trust = Trust(math.sqrt(spread), clears=spread <= 1.0 + limit, teaches=distance <= limit)
-        healthy = self._decide(present, trust=trust)
+        validity = Validity(math.sqrt(spread), clears=spread <= 1.0 + limit, teaches=distance <= limit)
+        healthy = self._decide(present, validity=validity)
         if self.fits:
             corrected = self._reconsider(mode, h, y - undisturbed)
             if healthy and not corrected:
@@ -226,14 +226,14 @@ class Estimator:
             self.fits[mode].replace(sensor, fit[1:, sensor])
         return cleared.size > 0
 
-    def _decide(self, present: np.ndarray, *, trust: Trust | None) -> bool:
+    def _decide(self, present: np.ndarray, *, validity: Validity | None) -> bool:
         """Votes on each sensor's flag and sets f_hat; says whether every sensor was judged and found healthy."""
-        all_well = trust is not None and trust.teaches and bool(present.all() and self.judged.all())
+        all_well = validity is not None and validity.teaches and bool(present.all() and self.judged.all())
         for i, flag in enumerate(self.flags):
             if present[i] and not self.judged[i]:
                 continue
             threshold = self.settings["thresholds"][i]
-            factor = trust.factor(flagged=flag.up) if trust else 1.0
+            factor = validity.factor(flagged=flag.up) if validity else 1.0
             beyond = abs(self.residual[i]) > factor * threshold
             flag.vote(faulty=bool(beyond or not present[i]), lost=not present[i])
             largest = self.settings["largest_fault"][i]
@@ -241,7 +241,7 @@ class Estimator:
                 self.f_hat[i] = 0.0
             elif present[i]:
                 self.f_hat[i] = np.clip(self.residual[i], -largest, largest)
-            quiet = trust is not None and abs(self.residual[i]) <= 0.5 * trust.widening * threshold
+            quiet = validity is not None and abs(self.residual[i]) <= 0.5 * validity.widening * threshold
             all_well = all_well and not flag.up and quiet and not beyond
         return all_well
 

@@ -1,8 +1,4 @@
-"""Claims proved once more in rational arithmetic: the loop formed of the doubles that ship, pivots without rounding.
-
-promise: running-loop
-promise: certified-gains
-"""
+"""Claims proved once more in rational arithmetic: the loop formed of the doubles that ship, pivots without rounding."""
 
 from __future__ import annotations
 
@@ -59,7 +55,7 @@ def bounded_real(loop: System, P: np.ndarray, level: float) -> np.ndarray:
 
 
 # By how much the reach of the disturbance and the signal are enlarged for a candidate, tried in turn.
-ROOM = [(1e-6, 1e-4), (1e-4, 1e-4), (1e-2, 1e-4), (1e-2, 1e-3), (1.0, 1e-4), (1.0, 1e-3)]
+ENLARGEMENTS = [(1e-6, 1e-4), (1e-4, 1e-4), (1e-2, 1e-4), (1e-2, 1e-3), (1.0, 1e-4), (1.0, 1e-3)]
 
 
 def storage(loop: System, level: float, reach: float, signal: float) -> np.ndarray:
@@ -77,7 +73,7 @@ def storage(loop: System, level: float, reach: float, signal: float) -> np.ndarr
 def bounded(design: dict, index: int, level: float) -> bool:
     """Whether the gain of a mode's loop is at most `level`, whatever a disturbance does."""
     rounded, exact = channels(design, index).disturbance, channels(design, index, exact=True).disturbance
-    for reach, signal in ROOM:
+    for reach, signal in ENLARGEMENTS:
         try:
             P = rationals(storage(rounded, level * (1 - 1e-5), reach, signal))
         except np.linalg.LinAlgError:
@@ -99,7 +95,10 @@ def example(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFac
 
 
 def test_gains_of_the_running_loop(example: dict) -> None:
-    """gamma_loop of every mode."""
+    """gamma_loop of every mode.
+
+    promise: running-loop
+    """
     check_gains(example)
 
 
@@ -157,7 +156,10 @@ def attenuates(loop: System, S: np.ndarray, following: np.ndarray, level: Fracti
 
 
 def test_state_feedback(example: dict) -> None:
-    """Decay, gamma and dwell time with the state known, by the shipped Lyapunov matrices."""
+    """Decay, gamma and dwell time with the state known, by the shipped Lyapunov matrices.
+
+    promise: certified-gains
+    """
     check_state_feedback(example)
 
 
@@ -186,7 +188,10 @@ def check_state_feedback(design: dict) -> None:
 
 
 def test_observer(example: dict) -> None:
-    """The error's decay, and what a switch lets it grow by."""
+    """The error's decay, and what a switch lets it grow by.
+
+    promise: certified-gains
+    """
     check_observer(example)
 
 
@@ -209,7 +214,10 @@ def check_observer(design: dict) -> None:
 
 
 def test_gain_under_arbitrary_switching(example: dict) -> None:
-    """The gain of the running loop across switches, by the shipped Lyapunov matrices."""
+    """The gain of the running loop across switches, by the shipped Lyapunov matrices.
+
+    promise: running-loop
+    """
     check_switching(example)
 
 
@@ -257,10 +265,13 @@ def with_injection(design: dict, index: int, following: int) -> System:
 
 
 def test_gains_below_the_norm_are_not_proved(example: dict) -> None:
-    """The judge refuses a level that is too low, whatever the candidate."""
+    """The judge refuses a level that is too low, whatever the candidate.
+
+    promise: running-loop
+    """
     level = channels(example, 0).disturbance.l2_gain()
     exact = channels(example, 0, exact=True).disturbance
-    P = rationals(storage(channels(example, 0).disturbance, 1.1 * level, *ROOM[0]))
+    P = rationals(storage(channels(example, 0).disturbance, 1.1 * level, *ENLARGEMENTS[0]))
     assert not positive_definite(bounded_real(exact, P, 0.98 * level))
     assert not bounded(example, 0, 0.98 * level)
 
@@ -276,7 +287,10 @@ def error_maps(design: dict, lost: dict, exact: bool) -> list[np.ndarray]:  # no
 
 
 def test_observers_without_sensors(example: dict) -> None:
-    """One function shrinks under every mode and every served set, where sets may change at each sample."""
+    """One function shrinks under every mode and every served set, where sets may change at each sample.
+
+    promise: running-loop
+    """
     check_lost(example)
 
 

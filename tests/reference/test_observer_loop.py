@@ -4,12 +4,16 @@ Flags, suspects, `model_valid`, faults of actuators and the mode found are equal
 to `RELATIVE` of their own size or of a thousandth of the signal's largest value. Both loops are closed, each with a
 plant of its own: a difference in one sample would come back in the next.
 
+Not compared: thresholds changed while it runs, readings marked as held, directional derivatives, saved states.
+
 promise: second-implementation
 """
 
 from __future__ import annotations
 
 import re
+import shutil
+import tomllib
 from copy import deepcopy
 from typing import TYPE_CHECKING
 
@@ -70,6 +74,7 @@ def assert_same(ours: list[dict], theirs: list[dict], leads: list[float]) -> Non
     """Compares two runs signal by signal; says at the first sample of another verdict how close it was."""
     for name in theirs[0]:
         got, wanted = (np.array([step[name] for step in run]) for run in (ours, theirs))
+        assert name == "y" or np.isfinite(wanted).all(), name
         if name in VERDICTS:
             differing = np.flatnonzero((got != wanted).any(axis=1))
             if differing.size:
@@ -106,16 +111,20 @@ def state_based(base: dict, **settings: object) -> dict:
 
 
 def example(name: str, folder: Path) -> Path:
-    """Writes an example with the default estimator in place of its own."""
+    """Writes an example with the default estimator in place of its own, and the logs to which it is fitted."""
     text = (commands.ROOT / "examples" / f"{name}.toml").read_text()
-    text, count = re.subn(r"(?ms)^\[estimator\]\n.*?^\[", '[estimator]\nmethod = "observer"\n\n[', text)
+    logs = re.findall(r"^database = \[.*\]$", text, re.MULTILINE)
+    for log in (commands.ROOT / "examples").glob("*.csv"):
+        shutil.copy(log, folder)
+    section = "\n".join(["[estimator]", 'method = "observer"', *logs, "", "["])
+    text, count = re.subn(r"(?ms)^\[estimator\]\n.*?^\[", section, text)
     assert count == 1
     path = folder / f"{name}.toml"
     path.write_text(text)
     return path
 
 
-@pytest.mark.parametrize("name", ["paper", "paper_output", "paper_internal_model", "paper_latency", "tank"])
+@pytest.mark.parametrize("name", ["paper", "paper_output", "paper_internal_model", "paper_latency", "tank", "logged"])
 def test_examples(tmp_path: Path, name: str) -> None:
     """Every linear example, with and without compensation and told the fault, against the native run."""
     path = example(name, tmp_path)
@@ -163,7 +172,7 @@ FAULTS = {
     "bias": [event(0, "bias", 150.0, 300.0, size=0.3)],
     "dropout": [event(0, "dropout", 150.0, 200.0), event(1, "dropout", 180.0, 220.0)],
     "gain": [event(0, "gain-loss", 150.0, 350.0, loss=0.4)],
-    "drift": [event(0, "drift", 150.0, 400.0, slope=0.002)],
+    "drift": [event(1, "drift", 150.0, 400.0, slope=0.004)],
     "stuck": [event(0, "stuck", 250.0, 450.0)],
     "intermittent": [event(1, "intermittent", 150.0, 400.0, size=0.3, period=20.0)],
     "start": [event(0, "bias", 0.0, 200.0, size=0.3)],
@@ -216,11 +225,49 @@ def stuck_with_noise(sensor: int, begin: int, end: int, deviation: float) -> Cal
     return begins
 
 
+def paper(**settings: object) -> dict:
+    """Returns the paper's example."""
+    return state_based(design_file.scenario_a(disturbed="state", reference="levels", noise=0.005), **settings)
+
+
+def sensors(C: list[list[float]], *others: list[list[float]], **settings: object) -> dict:
+    """Returns the paper's example with these sensors, in the second mode with others where they are given."""
+    design = paper(**settings)
+    for mode, matrix in zip(design["mode"], [C, *(others or [C])], strict=True):
+        mode["C"], mode["F"] = matrix, [[0.1 * row] for row in range(len(C))]
+    design["scenario"]["fault"] = [0.0] * len(C)
+    tracked = [1, 2][: len(C)]
+    design["controller"]["tracked"] = tracked
+    design["scenario"]["reference"] = design["scenario"]["reference"][: len(tracked)]
+    return design
+
+
+def late(**settings: object) -> dict:
+    """Returns the example designed for a delay, with saturating inputs that do not jump at a switch."""
+    design = state_based(design_file.delayed(), **settings)
+    design["signals"] = {"inputs": [{"min": -1.5, "max": 1.5}] * 2}
+    design["controller"] |= {"bumpless": True}
+    return design
+
+
+def tank() -> dict:
+    """Returns the stirred tank: three states, two sensors, one input, operating points, two harmonics."""
+    return state_based(tomllib.loads((commands.ROOT / "examples" / "tank.toml").read_text()))
+
+
+BOTH = [[1.0, 0.0], [0.0, 1.0]]
+THREE = [*BOTH, [1.0, 1.0]]
 DESIGNS = {
-    "paper": lambda: state_based(design_file.scenario_a(disturbed="state", reference="levels", noise=0.005)),
-    "trusting": lambda: state_based(
-        design_file.scenario_a(disturbed="state", reference="levels", noise=0.005), ambiguous="trust-model"
-    ),
+    "paper": paper,
+    "trusting": lambda: paper(ambiguous="trust-model"),
+    "found": lambda: paper(mode="estimated"),
+    "found at once": lambda: sensors(BOTH, [[1.0, 0.2], [0.0, 1.0]], mode="estimated", mode_length=100),
+    "three": lambda: sensors(THREE),
+    "one": lambda: sensors(BOTH[:1]),
+    "four, trusting": lambda: sensors([*THREE, [1.0, -1.0]], ambiguous="trust-model"),
+    "late": late,
+    "silenced": lambda: paper(stuck_after=3),
+    "tank": tank,
 }
 
 
@@ -240,19 +287,111 @@ def exported(tmp_path_factory: pytest.TempPathFactory) -> Callable[[str], tuple[
 
 
 @pytest.mark.parametrize("faults", list(FAULTS))
-@pytest.mark.parametrize("name", list(DESIGNS))
+@pytest.mark.parametrize("name", ["paper", "trusting"])
 def test_faults(exported: Callable[[str], tuple[dict, Path]], name: str, faults: str) -> None:
     """Each kind of fault, alone and together, at the switch and from the first sample."""
     design, fmu = exported(name)
     run, _ = check_against_the_fmu(with_events(design, FAULTS[faults]), fmu, 620)
     flagged = np.array([step["fault"] for step in run])
-    assert flagged.any() == (faults != "none" and (faults != "drift" or name == "trusting"))
+    assert flagged.any() == (faults != "none")
 
 
-@pytest.mark.parametrize("name", list(DESIGNS))
+@pytest.mark.parametrize("faults", ["switch", "in turn"])
+@pytest.mark.parametrize("name", [name for name in DESIGNS if name not in {"paper", "trusting"}])
+def test_designs(exported: Callable[[str], tuple[dict, Path]], name: str, faults: str) -> None:
+    """Modes found, more and fewer sensors than states, delay, saturation, silenced repetition, physical units."""
+    design, fmu = exported(name)
+    outputs = design["signals"]["outputs"]
+    size = 60.0 * min(design["scenario"]["noise"]) / 0.3
+    events = [given | {"sensor": given["sensor"] % len(outputs)} for given in FAULTS[faults]]
+    run, _ = check_against_the_fmu(with_events(design, events, size), fmu, 620)
+    assert any(step["fault"].any() for step in run)
+
+
+@pytest.mark.parametrize("name", ["paper", "trusting"])
 def test_a_stuck_sensor_with_noise(exported: Callable[[str], tuple[dict, Path]], name: str) -> None:
     """It repeats no reading; its noise about one value tells."""
     design, fmu = exported(name)
     run, kept = check_against_the_fmu(with_events(design, []), fmu, 620, stuck_with_noise(0, 250, 450, 0.005))
     assert "freeze" in kept
     assert any(step["fault"][0] for step in run)
+
+
+# What the plant does that the model does not know: gains of the inputs, loads on the states, errors of the matrices.
+DEPARTURES = {
+    "weak input": {"gain": 0.7},
+    "load": {"load": [0.2, 0.0]},
+    "unmatched load": {"load": [0.05, -0.05]},
+    "elsewhere": {"start": [0.5, -0.3]},
+    "wrong matrices": {"error": 0.15},
+    "another plant": {"error": 0.8},
+}
+
+
+def depart(design: dict, *, gain: float = 1.0, error: float = 0.0) -> dict:
+    """Returns a record whose plant has a weak first input, or relative errors in every entry of A and B."""
+    changed, random = deepcopy(design), np.random.default_rng(5)
+    plant = deepcopy(design["plant"])
+    for mode in plant["modes"]:
+        mode["b"] = (np.array(mode["b"]) * [gain, 1.0]).tolist()
+        for key in "ab":
+            matrix = np.array(mode[key])
+            mode[key] = (matrix * (1.0 + error * random.uniform(-1.0, 1.0, matrix.shape))).tolist()
+    changed["true_plant"] = {"kind": "linear", "plant": plant}
+    return changed
+
+
+def pushed(load: tuple[float, ...] = (0.0, 0.0), start: tuple[float, ...] = (0.0, 0.0)) -> Callable:
+    """Returns a load on the states that acts from sample 150 to 350, and how far from rest the plant begins."""
+
+    def push(tick: int) -> np.ndarray:
+        return np.array(start) if tick < 0 else np.array(load) * (150 <= tick < 350)
+
+    return push
+
+
+@pytest.mark.parametrize("departure", list(DEPARTURES))
+@pytest.mark.parametrize("name", ["paper", "three"])
+def test_a_changed_plant(exported: Callable[[str], tuple[dict, Path]], name: str, departure: str) -> None:
+    """The plant is not the model, and one sensor fails."""
+    design, fmu = exported(name)
+    given = DEPARTURES[departure]
+    push = pushed(**{key: given[key] for key in ("load", "start") if key in given})
+    changed = depart(design, **{key: given[key] for key in ("gain", "error") if key in given})
+    faulty = with_events(changed, [event(0, "bias", 200.0, 300.0, size=0.3)])
+    check_against_the_fmu(faulty, fmu, 620, push=push)
+
+
+def test_a_wrong_model_whose_mode_is_looked_for(exported: Callable[[str], tuple[dict, Path]]) -> None:
+    """Drifts are likelier by far than all that convinces: what convinces stays, and each mode has a probability."""
+    design, fmu = exported("found")
+    faulty = with_events(depart(design, error=0.8), [event(1, "drift", 150.0, 400.0, slope=0.004)])
+    run, _ = check_against_the_fmu(faulty, fmu, 300)
+    np.testing.assert_allclose([step["mode_probability"].sum() for step in run], 1.0, rtol=1e-12)
+
+
+def test_every_explanation_is_tried(exported: Callable[[str], tuple[dict, Path]]) -> None:
+    """The comparisons reach everything that a hypothesis can be made of."""
+    design, fmu = exported("paper")
+    kept = set()
+    for changed, push in (
+        (with_events(design, FAULTS["in turn"]), None),
+        (with_events(depart(design, error=0.8), []), None),
+        (with_events(design, []), pushed(start=(0.5, -0.3))),
+        (with_events(design, FAULTS["drift"]), pushed(load=(0.2, 0.0))),
+    ):
+        kept |= check_against_the_fmu(changed, fmu, 620, push=push)[1]
+    every = "stay load loosen tighten start home return drift bias scale freeze change release"
+    assert kept == set(every.split())
+
+
+@pytest.mark.parametrize("name", list(DESIGNS))
+def test_a_flag_ends_with_its_fault(exported: Callable[[str], tuple[dict, Path]], name: str) -> None:
+    """A bias is flagged to its last sample and for ten more at most; a jump of a load may explain its first two."""
+    design, fmu = exported(name)
+    size = 60.0 * max(design["scenario"]["noise"])
+    healthy = with_events(design, [])
+    run, _ = check_against_the_fmu(with_events(healthy, [event(0, "bias", 150.0, 300.0, size=size)]), fmu, 400)
+    flagged = np.array([step["fault"][0] for step in run], dtype=bool)
+    assert flagged[152:300].all()
+    assert not flagged[310:].any()

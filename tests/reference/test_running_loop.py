@@ -1,8 +1,4 @@
-"""What is claimed of the loop that runs, against the same figures computed from the shipped numbers by other means.
-
-promise: running-loop
-promise: lost-sensors
-"""
+"""What is claimed of the loop that runs, against the same figures computed from the shipped numbers by other means."""
 
 from __future__ import annotations
 
@@ -125,12 +121,18 @@ def example(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFac
 
 
 def test_examples_keep_their_claims(example: dict) -> None:
-    """Gains of the running loop of every example, tight to 5 %."""
+    """Gains of the running loop of every example, tight to 5 %.
+
+    promise: running-loop
+    """
     check_claims(example)
 
 
 def test_examples_serve_what_they_say(example: dict) -> None:
-    """The table of lost sensors of every example; of stable plants every set is served."""
+    """The table of lost sensors of every example; of stable plants every set is served.
+
+    promise: lost-sensors
+    """
     stable = all(np.abs(np.linalg.eigvals(mode["a"])).max() < 1 for mode in example["plant"]["modes"])
     served = check_table(example)
     if stable:
@@ -177,13 +179,19 @@ def check_runs(design: dict) -> None:
 
 
 def test_examples_stay_below_their_claims(example: dict) -> None:
-    """Runs of every example, healthy and with every served set of sensors lost."""
+    """Runs of every example, healthy and with every served set of sensors lost.
+
+    promise: running-loop
+    """
     check_runs(example)
 
 
 @pytest.mark.parametrize("seed", SEEDS)
 def test_random_plants_keep_their_claims(tmp_path: Path, seed: int) -> None:
-    """Ninety random plants: every claim, the table, and runs."""
+    """Ninety random plants: every claim, the table, and runs.
+
+    promise: running-loop
+    """
     path = design_file.write(random_design(seed), tmp_path)
     try:
         design = record.load(commands.export(path, tmp_path).controller)

@@ -130,6 +130,38 @@ impl Access {
     }
 }
 
+/// What the usual call asks of a variable, one bit each: the states in which it may be set to whatever
+/// value, its type, whether it is an input, whether it is latched.
+#[derive(Clone, Copy, Debug)]
+struct Mark(u16);
+
+impl Mark {
+    const INPUT: u16 = 1 << 12;
+    const NOT_LATCHED: u16 = 1 << 13;
+
+    fn of(access: &Access, latched: bool) -> Self {
+        let settable = match access.range {
+            None => access.settable.bits(),
+            Some(_) => 0,
+        };
+        let input = match access.causality {
+            Causality::Input => Self::INPUT,
+            _ => 0,
+        };
+        let other = if latched { 0 } else { Self::NOT_LATCHED };
+        Self(settable | Self::typed(access.base) | input | other)
+    }
+
+    /// A variable of this type.
+    const fn typed(base: Base) -> u16 {
+        match base {
+            Base::Real => 1 << 9,
+            Base::Integer => 1 << 10,
+            Base::Boolean => 1 << 11,
+        }
+    }
+}
+
 /// What an instance has told the importer, once each; not part of a saved state.
 #[derive(Clone, Copy, Debug, Default)]
 struct Told {
@@ -149,6 +181,7 @@ pub struct Component<S: Slave> {
     slave: S,
     guid: String,
     access: Box<[Access]>,
+    marks: Box<[Mark]>,
     current: Snapshot<S::State>,
     /// The state after fmi2Instantiate.
     fresh: Snapshot<S::State>,
@@ -176,15 +209,17 @@ impl<S: Slave> Component<S> {
         }
         let start = Values::start(slave.variables());
         let (footprint, fresh) = memory::size_of_made(|| Snapshot::fresh(&slave));
+        let variables = slave.variables().iter();
+        let access: Box<[Access]> = variables.map(|(_, it)| Access::of(it)).collect();
         Ok(Self {
             logger,
             messages: Vec::new(),
             guid: guid.to_string(),
-            access: slave
-                .variables()
-                .iter()
-                .map(|(_, variable)| Access::of(variable))
+            marks: (0..)
+                .zip(&access)
+                .map(|(reference, access)| Mark::of(access, slave.is_latched(reference)))
                 .collect(),
+            access,
             current: fresh.clone(),
             footprint: footprint + size_of::<Snapshot<S::State>>(),
             trial: fresh.state.clone(),
@@ -274,10 +309,8 @@ impl<S: Slave> Component<S> {
         convert: impl Fn(f64) -> Option<T>,
     ) -> Outcome {
         self.refresh()?;
-        if !self.all(references, |access| access.base == base) {
-            for &reference in references {
-                self.access(reference, base)?;
-            }
+        if self.common(references) & Mark::typed(base) == 0 {
+            self.check_types(references, base)?;
         }
         for (&reference, slot) in references.iter().zip(out) {
             let value = self.current.values.at(reference).unwrap_or_default();
@@ -286,12 +319,21 @@ impl<S: Slave> Component<S> {
         Ok(())
     }
 
-    /// Whether all of these variables exist and pass the test.
+    /// Whether each of these variables exists and is of this type.
+    #[cold]
+    #[inline(never)]
+    fn check_types(&self, references: &[ValueReference], base: Base) -> Outcome {
+        for &reference in references {
+            self.access(reference, base)?;
+        }
+        Ok(())
+    }
+
+    /// The marks that all of these variables have; none where one does not exist.
     #[inline]
-    fn all(&self, references: &[ValueReference], test: impl Fn(&Access) -> bool) -> bool {
-        references
-            .iter()
-            .all(|&reference| self.access.get(reference as usize).is_some_and(&test))
+    fn common(&self, references: &[ValueReference]) -> u16 {
+        let mark = |&reference| self.marks.get(reference as usize).map_or(0, |mark| mark.0);
+        references.iter().fold(u16::MAX, |all, it| all & mark(it))
     }
 
     /// Sets values of one type; nothing is set from a call with one bad entry.
@@ -303,25 +345,29 @@ impl<S: Slave> Component<S> {
         convert: impl Fn(T) -> f64,
     ) -> Outcome {
         let phase = self.phase();
-        let free = |access: &Access| {
-            access.base == base && access.range.is_none() && access.settable.contain(phase)
-        };
-        if !self.all(references, free) {
+        let free = Mark::typed(base) | phase as u16;
+        if self.common(references) & free != free {
             self.check_each(base, references, values, &convert)?;
         }
+        let mut marks = 0;
         for (&reference, &value) in references.iter().zip(values) {
-            if let Some(slot) = self.current.values.slot(reference) {
+            let mark = self.marks.get(reference as usize);
+            if let (Some(slot), Some(mark)) = (self.current.values.slot(reference), mark) {
                 *slot = convert(value);
+                marks |= mark.0;
             }
-            let access = self.access.get(reference as usize);
-            self.current.handed_over |=
-                access.is_some_and(|access| access.causality == Causality::Input);
+        }
+        self.current.handed_over |= marks & Mark::INPUT != 0;
+        if marks & Mark::NOT_LATCHED != 0 {
+            self.current.values.unsettle();
         }
         self.current.stale = phase == State::InitializationMode;
         Ok(())
     }
 
     /// Whether each of these values may be set.
+    #[cold]
+    #[inline(never)]
     fn check_each<T: Copy>(
         &self,
         base: Base,
@@ -367,11 +413,8 @@ impl<S: Slave> Component<S> {
             }
         };
         let late = self.run_ticks(waits, &before)?;
-        if let Some(k) = late
-            && !std::mem::replace(&mut self.told.late_inputs, true)
-        {
-            let text = late_inputs(&before, k, length);
-            self.warn(Function::DoStep, &text);
+        if let Some(k) = late {
+            self.tell_late_inputs(&before, k, length);
         }
         if !self.told.notice
             && let Some(text) = self.slave.notice(&self.current.state)
@@ -384,11 +427,16 @@ impl<S: Slave> Component<S> {
             return Ok(());
         }
         self.current.phase = State::StepFailed;
-        Err(Failure::discard(format!(
-            "a step of {length} s runs more than {MOST_TICKS} ticks of {te} s and was done up to \
-             {now} s; make steps of at most {} s",
-            MOST_TICKS as f64 * te
-        )))
+        Err(too_long(length, te, now))
+    }
+
+    /// Warns, once, of inputs from before the tick that they were for.
+    #[cold]
+    fn tell_late_inputs(&mut self, before: &Clock, k: u64, length: f64) {
+        if !std::mem::replace(&mut self.told.late_inputs, true) {
+            let text = late_inputs(before, k, length);
+            self.warn(Function::DoStep, &text);
+        }
     }
 
     /// Checks the inputs that the coming ticks read; says whether the mode is still untold.
@@ -403,12 +451,17 @@ impl<S: Slave> Component<S> {
         match self.slave.check_inputs(&current.values)? {
             Readiness::Complete => Ok(false),
             Readiness::ModeUntold(_) if current.provisional => Ok(true),
-            Readiness::ModeUntold(mode) => Err(Failure::error(format!(
-                "{} is 0, which means not told yet, after a mode had been told: the modes are the \
-                 whole numbers from 1 on",
-                self.name(mode)
-            ))),
+            Readiness::ModeUntold(mode) => Err(self.untold(mode)),
         }
+    }
+
+    #[cold]
+    fn untold(&self, mode: ValueReference) -> Failure {
+        Failure::error(format!(
+            "{} is 0, which means not told yet, after a mode had been told: the modes are the \
+             whole numbers from 1 on",
+            self.name(mode)
+        ))
     }
 
     /// Runs the ticks up to the clock's time; while the slave `waits` for its mode they pass and
@@ -636,6 +689,8 @@ impl<S: Slave> Component<S> {
         )))
     }
 
+    #[cold]
+    #[inline(never)]
     fn not_settable(&self, reference: ValueReference, access: Access) -> Failure {
         let name = self.name(reference);
         Failure::error(match access.causality {
@@ -650,6 +705,8 @@ impl<S: Slave> Component<S> {
     }
 
     /// Refuses a value that is none of the type asked for.
+    #[cold]
+    #[inline(never)]
     fn not_of(&self, base: Base, reference: ValueReference, value: f64) -> Failure {
         let name = self.name(reference);
         Failure::error(format!("{name} is {value}, which is no {base:?}"))
@@ -698,6 +755,16 @@ fn address<T>(saved: &Saved<T>) -> usize {
 /// A number of six digits, for a sentence.
 fn shortened(value: f64) -> f64 {
     format!("{value:.5e}").parse().unwrap_or(value)
+}
+
+/// A step of more ticks than are run at once.
+#[cold]
+fn too_long(length: f64, te: f64, now: f64) -> Failure {
+    Failure::discard(format!(
+        "a step of {length} s runs more than {MOST_TICKS} ticks of {te} s and was done up to \
+         {now} s; make steps of at most {} s",
+        MOST_TICKS as f64 * te
+    ))
 }
 
 /// The warning that a tick ran on inputs from before it began.

@@ -63,6 +63,20 @@ fn run<S: Slave>(
     } else {
         Ok(Err(Failure::error(refused(function, phase.name()))))
     };
+    match ran {
+        Ok(Ok(())) => Status::Ok,
+        ran => report(component, function, ran),
+    }
+}
+
+/// Leaves what went wrong for the log.
+#[cold]
+#[inline(never)]
+fn report<S: Slave>(
+    component: &mut Component<S>,
+    function: Function,
+    ran: std::thread::Result<Outcome>,
+) -> Status {
     let (status, message) = match ran {
         Ok(Ok(())) => return Status::Ok,
         Ok(Err(failure)) => (failure.status, failure.message),
@@ -77,6 +91,8 @@ fn run<S: Slave>(
     status
 }
 
+#[cold]
+#[inline(never)]
 fn refused(function: Function, phase: &str) -> String {
     if function.allowed() == crate::life_cycle::States::NONE {
         "this FMU is for co-simulation, not for model exchange".into()
@@ -97,7 +113,7 @@ fn panic_text(panic: &(dyn Any + Send)) -> &str {
 ///
 /// `pointer` is null or points to `count` values.
 unsafe fn array<'a, T>(
-    what: &str,
+    what: &'static str,
     pointer: *const T,
     count: usize,
     most: usize,
@@ -116,7 +132,7 @@ unsafe fn array<'a, T>(
 ///
 /// `pointer` is null or points to `count` values that nothing else refers to.
 unsafe fn array_mut<'a, T>(
-    what: &str,
+    what: &'static str,
     pointer: *mut T,
     count: usize,
     most: usize,
@@ -129,20 +145,23 @@ unsafe fn array_mut<'a, T>(
     Ok(unsafe { slice::from_raw_parts_mut(pointer, count) })
 }
 
-fn check_array<T>(what: &str, pointer: *const T, count: usize, most: usize) -> Outcome {
-    if count == 0 {
+#[inline]
+fn check_array<T>(what: &'static str, pointer: *const T, count: usize, most: usize) -> Outcome {
+    if count == 0 || (!pointer.is_null() && count <= most) {
         Ok(())
-    } else if pointer.is_null() {
-        Err(Failure::error(format!(
-            "{what} is a null pointer, but {count} values are asked for"
-        )))
-    } else if count > most {
-        Err(Failure::error(format!(
-            "{what} would have {count} values: at most {most} make sense"
-        )))
     } else {
-        Ok(())
+        Err(no_array(what, pointer.is_null(), count, most))
     }
+}
+
+#[cold]
+#[inline(never)]
+fn no_array(what: &'static str, is_null: bool, count: usize, most: usize) -> Failure {
+    Failure::error(if is_null {
+        format!("{what} is a null pointer, but {count} values are asked for")
+    } else {
+        format!("{what} would have {count} values: at most {most} make sense")
+    })
 }
 
 /// Writes through a pointer that must not be null.

@@ -67,6 +67,11 @@ impl States {
         self.0 & state as u16 != 0
     }
 
+    /// A bit for each of them: [`State`] as a number.
+    pub const fn bits(self) -> u16 {
+        self.0
+    }
+
     /// Reads a row of the table: an `x` for each state in the set.
     const fn from_row(row: &str) -> Self {
         let row = row.as_bytes();

@@ -80,6 +80,12 @@ pub trait Slave: Sized + 'static {
     /// The state of a fresh instance, the same at every call.
     fn initial_state(&self) -> Self::State;
 
+    /// Whether this variable is an input that counts when a tick begins only, and is checked before every
+    /// one: setting it leaves the others [settled](Values::are_settled).
+    fn is_latched(&self, _reference: u32) -> bool {
+        false
+    }
+
     /// Makes the state and the outputs at the start time from parameters and initial inputs,
     /// whatever `state` held before; allocates nothing.
     ///
@@ -200,6 +206,7 @@ pub fn selected_mode(
 
 /// The mode nearest to the number given, counted from 0: where to start while the mode's source
 /// is not initialised.
+#[inline]
 pub fn nearest_mode(values: &Values, [integer, real]: [Span; 2], modes: usize) -> usize {
     let twin = values.scalar(real);
     let number = if twin == 0.0 {
@@ -211,13 +218,18 @@ pub fn nearest_mode(values: &Values, [integer, real]: [Span; 2], modes: usize) -
 }
 
 /// Refuses a vector with an element that is NaN or infinite, and names the element.
+#[inline]
 pub fn require_finite(table: &VariableTable, values: &Values, span: Span) -> Result<(), Refusal> {
-    let elements = values.get(span);
-    if elements.iter().all(|value| value.is_finite()) {
+    if values.are_finite(span) {
         return Ok(());
     }
+    refuse_infinite(table, values, span)
+}
+
+#[cold]
+fn refuse_infinite(table: &VariableTable, values: &Values, span: Span) -> Result<(), Refusal> {
     match (span.first..)
-        .zip(elements)
+        .zip(values.get(span))
         .find(|(_, value)| !value.is_finite())
     {
         None => Ok(()),

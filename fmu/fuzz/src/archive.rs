@@ -1,4 +1,4 @@
-//! Archives as `verify` reads them: any bytes, and sound ones that were damaged in their entries or as a whole.
+//! Archives as `verify` reads them: any bytes, and intact ones that were damaged in their entries or as a whole.
 
 use crate::{description, reading};
 use libfuzzer_sys::arbitrary::{self, Arbitrary};
@@ -18,10 +18,10 @@ pub enum Damage {
     Archive(Vec<Entry>, Vec<Patch>, Option<u16>),
 }
 
-/// An entry, beside those of a sound FMU.
+/// An entry, beside those of a intact FMU.
 #[derive(Arbitrary, Clone, Debug)]
 pub struct Entry {
-    /// One of the sound names, or the next field.
+    /// One of the intact names, or the next field.
     known: Option<u8>,
     name: String,
     contents: Vec<u8>,
@@ -61,14 +61,14 @@ fn is_known(name: &str) -> bool {
 /// An archive of the entries; none where the writer itself refuses them.
 fn zipped(entries: &[Entry]) -> Option<Vec<u8>> {
     let mut archive = ZipWriter::new(Cursor::new(Vec::new()));
-    let sound = SimpleFileOptions::default().compression_method(CompressionMethod::Stored);
+    let intact = SimpleFileOptions::default().compression_method(CompressionMethod::Stored);
     let named = |entry: &Entry| match entry.known {
         Some(which) => KNOWN[usize::from(which) % KNOWN.len()].to_owned(),
         None => entry.name.clone(),
     };
     let replaced: Vec<String> = entries.iter().map(named).collect();
     for name in KNOWN.iter().filter(|name| !replaced.contains(&(**name).to_owned())) {
-        archive.start_file(*name, sound).ok()?;
+        archive.start_file(*name, intact).ok()?;
         archive.write_all(b"<fmiModelDescription guid=\"{1}\"/>").ok()?;
     }
     for (entry, name) in entries.iter().zip(replaced) {
@@ -76,7 +76,7 @@ fn zipped(entries: &[Entry]) -> Option<Vec<u8>> {
             true => CompressionMethod::Deflated,
             false => CompressionMethod::Stored,
         };
-        let options = sound.compression_method(method).unix_permissions(entry.mode);
+        let options = intact.compression_method(method).unix_permissions(entry.mode);
         archive.start_file(name, options).ok()?;
         for _ in 0..entry.times % 256 {
             archive.write_all(&entry.contents).ok()?;

@@ -20,7 +20,7 @@ pub struct Forged {
 }
 
 /// A small design with as much to prove as there is: two modes, bumpless, each sensor may be lost.
-fn sound() -> Design {
+fn proved() -> Design {
     let mode = |pole: f64| {
         Mode::new(
             dmatrix![pole, 0.1; 0.0, 0.5],
@@ -40,7 +40,7 @@ fn sound() -> Design {
 }
 
 static SOUND: LazyLock<(String, String)> = LazyLock::new(|| {
-    let mut design = sound();
+    let mut design = proved();
     let proof = design.proof.take().unwrap();
     let resource = model_description::write_design(&design).unwrap();
     let certificate = serde_json::to_string(&Certificate::new(proof, &resource)).unwrap();

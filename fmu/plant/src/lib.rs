@@ -93,7 +93,11 @@ impl PlantFmu {
     }
 
     fn injected<'a>(&self, values: &'a Values) -> Injected<'a> {
-        let [kind, size, from, until] = self.spans.injected.map(|span| values.get(span));
+        let spans = self.spans.injected;
+        if values.get(spans[0]).iter().all(|&kind| kind == 0.0) {
+            return Injected::default();
+        }
+        let [kind, size, from, until] = spans.map(|span| values.get(span));
         Injected {
             kind,
             size,
@@ -103,14 +107,18 @@ impl PlantFmu {
     }
 
     /// Observes the present tick, faults from outside included.
-    fn observe(&self, state: &mut PlantState, values: &Values) {
+    fn observe(&self, state: &mut PlantState, values: &mut Values) {
         self.simulator.observe(state, &self.external(values));
         self.simulator.inject(state, &self.injected(values));
+        values.settle();
     }
 
     /// Refuses commands and disturbances that are no finite numbers.
     fn require_numbers(&self, values: &Values) -> Result<(), Refusal> {
         require_finite(&self.table, values, self.spans.command)?;
+        if values.are_settled() {
+            return Ok(());
+        }
         require_finite(&self.table, values, self.spans.external_disturbance)?;
         for span in self.spans.injected {
             require_finite(&self.table, values, span)?;
@@ -174,6 +182,10 @@ impl Slave for PlantFmu {
         self.simulator.initial_state()
     }
 
+    fn is_latched(&self, reference: u32) -> bool {
+        self.spans.command.range().contains(&(reference as usize))
+    }
+
     fn initialize(&self, state: &mut PlantState, values: &mut Values) -> Result<(), Refusal> {
         self.require_numbers(values)?;
         let external = self.external_mode(values);
@@ -210,7 +222,10 @@ impl Slave for PlantFmu {
         _k: u64,
         _fresh: bool,
     ) -> Result<(), Refusal> {
-        self.observe(state, values);
+        // The end of the tick before it has observed this one already.
+        if !values.are_settled() {
+            self.observe(state, values);
+        }
         let command = values.get(self.spans.command);
         self.simulator.advance(state, command).map_err(|Stalled| {
             Refusal::from(

@@ -11,6 +11,7 @@ pub const LARGEST: f64 = 1e100;
 ///
 /// Magnitudes below the smallest normal number become zero too: a state that decays for ever
 /// would otherwise end in denormals, which are several times slower to compute with.
+#[inline]
 pub fn bounded(value: f64) -> f64 {
     if value.is_nan() || value.abs() < f64::MIN_POSITIVE {
         0.0
@@ -20,6 +21,7 @@ pub fn bounded(value: f64) -> f64 {
 }
 
 /// Applies [`bounded`] to every entry.
+#[inline]
 pub fn bound(values: &mut [f64]) {
     for value in values {
         *value = bounded(*value);
@@ -65,6 +67,48 @@ fn add_few<const ROWS: usize>(out: &mut [f64], matrix: &Matrix, vector: &[f64]) 
 pub fn affine(out: &mut [f64], start: &[f64], matrix: &Matrix, vector: &[f64]) {
     copy(out, start);
     add_product(out, matrix, vector);
+}
+
+/// `out = start + matrix_1 * vector_1 + matrix_2 * vector_2 + ...`, summed in this order.
+#[inline]
+pub fn affine_sum<const K: usize>(out: &mut [f64], start: &[f64], terms: [(&Matrix, &[f64]); K]) {
+    match out.len() {
+        1 => affine_few::<1, K>(out, start, terms),
+        2 => affine_few::<2, K>(out, start, terms),
+        3 => affine_few::<3, K>(out, start, terms),
+        4 => affine_few::<4, K>(out, start, terms),
+        _ => {
+            copy(out, start);
+            for (matrix, vector) in terms {
+                add_product(out, matrix, vector);
+            }
+        }
+    }
+}
+
+/// The same for few rows: the sums stay in registers.
+#[inline]
+fn affine_few<const ROWS: usize, const K: usize>(
+    out: &mut [f64],
+    start: &[f64],
+    terms: [(&Matrix, &[f64]); K],
+) {
+    let (Some(out), Some(start)) = (out.first_chunk_mut::<ROWS>(), start.first_chunk::<ROWS>())
+    else {
+        return;
+    };
+    let mut sums = *start;
+    for (matrix, vector) in terms {
+        if matrix.nrows() != ROWS {
+            continue;
+        }
+        for (column, factor) in matrix.as_slice().as_chunks::<ROWS>().0.iter().zip(vector) {
+            for (sum, value) in sums.iter_mut().zip(column) {
+                *sum += factor * value;
+            }
+        }
+    }
+    *out = sums;
 }
 
 /// `out += factor * vector`.
@@ -180,6 +224,21 @@ mod tests {
                 add_scaled(&mut wanted, factor, column);
             }
             prop_assert_eq!(out, wanted);
+        }
+
+        /// Several products in one are those one after the other, to the same bits.
+        #[test]
+        fn a_sum_of_products_is_the_products(
+            rows in 0usize..7, entries in prop::collection::vec(-10.0..10.0f64, 42), x in prop::collection::vec(-10.0..10.0f64, 6),
+        ) {
+            let matrix = |from: usize| Matrix::from_fn(rows, 3, |r, c| entries[6 * r + from + c]);
+            let (first, second, start) = (matrix(0), matrix(3), vec![0.5; rows]);
+            let (left, right) = x.split_at(3);
+            let (mut found, mut wanted) = (vec![7.0; rows], vec![7.0; rows]);
+            affine_sum(&mut found, &start, [(&first, left), (&second, right)]);
+            affine(&mut wanted, &start, &first, left);
+            add_product(&mut wanted, &second, right);
+            prop_assert_eq!(found, wanted);
         }
 
         #[test]

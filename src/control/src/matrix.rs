@@ -1,15 +1,11 @@
-//! A dense matrix as plain data: entries column after column; serialised as a list of rows, in binary
-//! formats as bytes.
+//! A dense matrix as plain data: entries column after column.
 
-mod binary;
+mod serial;
 
-pub(crate) use binary::upper_triangle;
+pub(crate) use serial::upper_triangle;
 
 use alloc::vec;
 use alloc::vec::Vec;
-use serde::de::Error as _;
-use serde::ser::{Serialize, SerializeSeq, Serializer};
-use serde::{Deserialize, Deserializer};
 
 /// A matrix of `f64`, column-major; what the on-line path multiplies with.
 ///
@@ -148,39 +144,6 @@ impl Matrix {
     pub fn scaled(mut self, factor: f64) -> Self {
         self.entries.iter_mut().for_each(|entry| *entry *= factor);
         self
-    }
-}
-
-/// One row of a matrix, to be serialised.
-struct Row<'a>(&'a Matrix, usize);
-
-impl Serialize for Row<'_> {
-    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
-        serializer.collect_seq(self.0.row(self.1))
-    }
-}
-
-impl Serialize for Matrix {
-    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
-        if !serializer.is_human_readable() {
-            let entries = self.entries.iter().copied();
-            return binary::serialize(self.shape(), entries, serializer);
-        }
-        let mut rows = serializer.serialize_seq(Some(self.rows))?;
-        for row in 0..self.rows {
-            rows.serialize_element(&Row(self, row))?;
-        }
-        rows.end()
-    }
-}
-
-impl<'de> Deserialize<'de> for Matrix {
-    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
-        if !deserializer.is_human_readable() {
-            return deserializer.deserialize_bytes(binary::Reader::<false>);
-        }
-        let rows = Vec::<Vec<f64>>::deserialize(deserializer)?;
-        Self::try_from_rows(&rows).map_err(D::Error::custom)
     }
 }
 

@@ -8,9 +8,11 @@
 
 mod record;
 
-use crate::estimator::hypotheses::MOST_KEPT;
 use record::tuning;
 use serde::{Deserialize, Serialize};
+
+/// Most hypotheses of the state-based estimator that may be kept after a sample; its memory is sized by it.
+pub const MOST_KEPT: usize = 12;
 
 /// All tuning constants of a controller.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]

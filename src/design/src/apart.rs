@@ -1,4 +1,4 @@
-//! How far the readings of two modes part: what a controller that must find the mode lives on.
+//! How far the readings of two modes part: what finding the mode rests on.
 
 use crate::Design;
 use ftc_control::parameters::Hypotheses;
@@ -6,7 +6,7 @@ use ftc_plant::Mode;
 use nalgebra::DVector;
 
 /// Deviations of the noise by which readings must part for modes to be told apart.
-pub const ENOUGH: f64 = 3.0;
+pub const LEAST_DEVIATIONS: f64 = 3.0;
 
 /// Samples for which two modes are run beside each other.
 const SAMPLES: usize = 50;

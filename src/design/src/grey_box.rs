@@ -2,7 +2,7 @@
 //!
 //! A log is cut into windows. In each of them the state at its start, the disturbance's waves and a constant
 //! level of each of its channels are whatever explains the readings best; `A` and `B`, which all windows share,
-//! make the readings of the windows least wrong together (output error), at the price of what they differ from the
+//! make the readings of the windows least wrong together (output error), with a penalty on how far they differ from the
 //! design model, entry by entry, relative to the error that the model may have. Gauss-Newton with the windows'
 //! own unknowns projected out.
 
@@ -18,7 +18,7 @@ use nalgebra::{DMatrix, DVector};
 const WINDOW: usize = 40;
 const SAMPLES_PER_UNKNOWN: usize = 4;
 
-/// Every so many windows one is held back, and judges.
+/// Of so many windows one is held back to judge the fit.
 const HELD_BACK: usize = 4;
 
 /// Steps of the iteration, at most; none improves by less than this share where it ends.
@@ -97,10 +97,10 @@ pub(crate) fn fit(
     if windows.len() < HELD_BACK {
         return Err(Unusable::Short);
     }
-    let (mut judges, mut learn) = (Vec::new(), Vec::new());
+    let (mut held_back, mut learn) = (Vec::new(), Vec::new());
     for (at, window) in windows.into_iter().enumerate() {
         match at % HELD_BACK == HELD_BACK - 1 {
-            true => judges.push(window),
+            true => held_back.push(window),
             false => learn.push(window),
         }
     }
@@ -118,8 +118,11 @@ pub(crate) fn fit(
     }
     let (mut theta, mut left) = grey.improve(&learn, &model, model_error);
     // What was held back decides: a log that the model explains better is not used.
-    grey.deviation = grey.unexplained(&judges, &model);
-    let (of_model, of_fit) = (grey.rests(&judges, &model), grey.rests(&judges, &theta));
+    grey.deviation = grey.unexplained(&held_back, &model);
+    let (of_model, of_fit) = (
+        grey.rests(&held_back, &model),
+        grey.rests(&held_back, &theta),
+    );
     if of_fit >= of_model {
         (theta, left) = (model.clone(), model_error);
     }
@@ -128,10 +131,10 @@ pub(crate) fn fit(
         mode: FittedMode::new(
             plain(&a),
             plain(&b),
-            grey.percent(&judges, &theta),
-            grey.percent(&judges, &model),
+            grey.percent(&held_back, &theta),
+            grey.percent(&held_back, &model),
         ),
-        deviation: grey.unexplained(&judges, &theta).as_slice().to_vec(),
+        deviation: grey.unexplained(&held_back, &theta).as_slice().to_vec(),
         model_error: left.max(LEAST_ERROR.min(model_error)),
     })
 }

@@ -6,6 +6,7 @@
 //! same with `K = 0` and one `H_j` whatever mode was left.
 
 mod detectable;
+mod dynamics;
 #[cfg(feature = "solver")]
 mod existence;
 #[cfg(feature = "solver")]
@@ -25,16 +26,13 @@ pub(crate) use lost::gains_fit as lost_gains_fit;
 pub use lost::{LostCertificate, MOST_FOR_PAIRS, sets};
 
 #[cfg(feature = "solver")]
-use existence::PerUnit;
-#[cfg(feature = "solver")]
 pub use synthesis::synthesise;
 #[cfg(feature = "solver")]
 pub(crate) use synthesis::{Candidate, candidates, with_lost_sensors};
 
-use super::certificate::{CertificateError, LyapunovMatrix};
+use super::certificate::LyapunovMatrix;
 use super::{DwellTime, ObserverSpec};
 use ftc_control::parameters::Observer;
-use ftc_plant::SwitchedPlant;
 use serde::{Deserialize, Serialize};
 
 /// A certified observer.
@@ -67,14 +65,4 @@ pub struct ObserverCertificate {
     pub outputs: Vec<f64>,
     /// Matrices `P` of the functions `e' P e`: one for `common`, else one per mode.
     pub lyapunov: Vec<LyapunovMatrix>,
-}
-
-impl ObserverDesign {
-    /// Proves, from these very doubles, the decay of the estimation error on this plant.
-    ///
-    /// # Errors
-    /// The first inequality that cannot be proved, or what does not fit.
-    pub fn verify(&self, plant: &SwitchedPlant) -> Result<(), CertificateError> {
-        proof::verify(plant, self)
-    }
 }

@@ -14,27 +14,28 @@ mod gain;
 mod model;
 #[cfg(feature = "solver")]
 mod selection;
+mod subject;
 #[cfg(feature = "solver")]
 mod switching;
+mod switching_proof;
 mod transfer;
 #[cfg(feature = "solver")]
 mod transfer_synthesis;
 
 use crate::blocks::{BlockKind, BlockName};
-use crate::certificate::{CertificateError, FactoredLyapunov, require};
-use crate::observer::{check_detectable, sets};
+use crate::certificate::{CertificateError, require};
+use crate::observer::sets;
 use crate::parallel;
-use crate::riccati;
-use crate::{ObserverDesign, StateFeedback, Units};
-use ftc_control::Matrix;
+use crate::{ObserverDesign, StateFeedback};
 use ftc_plant::SwitchedPlant;
-use gain::Channel;
-use model::{Loop, Models};
-use nalgebra::DMatrix;
+use model::Loop;
 use serde::{Deserialize, Serialize};
+use subject::{Claim, Subject};
+use switching_proof::prove_switching;
 
 #[cfg(feature = "solver")]
 pub(crate) use selection::choose;
+pub use switching_proof::SwitchingGain;
 pub use transfer::{TRANSFER_DECAY, TransferCertificate};
 
 /// How far the gain of the running loop may lie above that of a measured state, relatively, before a
@@ -66,16 +67,6 @@ pub struct RunningLoop {
     pub transfer: Option<TransferCertificate>,
 }
 
-/// A gain that holds under arbitrary switching.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[non_exhaustive]
-pub struct SwitchingGain {
-    /// The gain.
-    pub gamma: f64,
-    /// One Lyapunov matrix of the whole loop for all modes, or one per mode.
-    pub lyapunov: Vec<FactoredLyapunov>,
-}
-
 /// What the loss of some sensors leaves.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[non_exhaustive]
@@ -89,171 +80,6 @@ pub struct LostSensors {
     /// l2 gain from the disturbance to the performance signal while set and mode last, per mode; none
     /// where there is no disturbance, or where the set is not served.
     pub gamma_loop: Option<Vec<f64>>,
-}
-
-/// The gain of one channel in one loop.
-enum Claim {
-    Disturbance,
-    Noise,
-    Fault,
-}
-
-/// A channel with what it takes to state its gain in physical units.
-struct Scaled {
-    parts: [crate::certificate::Enclosure; 4],
-    /// Physical over certificate.
-    unit: f64,
-}
-
-impl Scaled {
-    fn of(model: &Loop, units: &Units, tracked: &[usize], claim: &Claim) -> Self {
-        use crate::certificate::Enclosure;
-        let size = model.a.shape().0;
-        match claim {
-            Claim::Disturbance => Self {
-                parts: [
-                    model.a.clone(),
-                    model.disturbance.clone(),
-                    model.performance.clone(),
-                    model.direct.clone(),
-                ],
-                unit: units.performance / units.disturbance,
-            },
-            Claim::Noise | Claim::Fault => {
-                let inward: Vec<f64> = units.outputs.iter().map(|unit| 1.0 / unit).collect();
-                let outward: Vec<f64> = tracked.iter().map(|&row| units.outputs[row]).collect();
-                let ones = vec![1.0; size];
-                Self {
-                    parts: [
-                        model.a.clone(),
-                        model.sensors.in_units(&ones, &inward),
-                        model.tracked.in_units(&outward, &ones),
-                        Enclosure::zeros(outward.len(), inward.len()),
-                    ],
-                    unit: 1.0,
-                }
-            }
-        }
-    }
-
-    fn channel(&self) -> Channel<'_> {
-        let [a, b, c, d] = &self.parts;
-        Channel { a, b, c, d }
-    }
-
-    fn level(&self, claim: &Claim) -> Option<f64> {
-        let level = match claim {
-            Claim::Noise => self.channel().noise_level(),
-            Claim::Disturbance | Claim::Fault => self.channel().level(),
-        };
-        Some(level? * self.unit)
-    }
-
-    fn proves(&self, claim: &Claim, level: f64) -> bool {
-        let level = level / self.unit;
-        match claim {
-            Claim::Noise => self.channel().proves_noise(level),
-            Claim::Disturbance | Claim::Fault => self.channel().proves(level),
-        }
-    }
-}
-
-/// The parts of a design that its running loop is made of.
-struct Subject<'a> {
-    plant: &'a SwitchedPlant,
-    control: &'a StateFeedback,
-    observer: &'a ObserverDesign,
-    models: Models<'a>,
-}
-
-impl<'a> Subject<'a> {
-    fn new(
-        plant: &'a SwitchedPlant,
-        control: &'a StateFeedback,
-        observer: &'a ObserverDesign,
-    ) -> Self {
-        Self {
-            plant,
-            control,
-            observer,
-            models: Models::new(plant, control),
-        }
-    }
-
-    fn modes(&self) -> usize {
-        self.plant.modes.len()
-    }
-
-    fn disturbed(&self) -> bool {
-        self.models.disturbed()
-    }
-
-    fn scaled(&self, model: &Loop, claim: &Claim) -> Scaled {
-        let tracked = &self.control.spec.tracked;
-        Scaled::of(model, self.models.units(), tracked, claim)
-    }
-
-    fn healthy(&self, mode: usize) -> Loop {
-        self.models.healthy(mode, &self.observer.observer)
-    }
-
-    /// The loops of a set of lost sensors, where it is served.
-    fn without(&self, sensors: &[usize]) -> Option<Vec<Loop>> {
-        let lost = &self.observer.observer.lost;
-        let set = lost.iter().find(|set| set.sensors == sensors)?;
-        let of = |(mode, gain): (usize, &Matrix)| self.models.corrected(mode, gain, sensors);
-        Some(set.correction.iter().enumerate().map(of).collect())
-    }
-
-    /// Whether the sensors that are left show the whole state, per mode.
-    fn observable(&self, lost: &[usize]) -> Vec<bool> {
-        let units = self.models.units();
-        let of = |mode: &ftc_plant::Mode| {
-            let kept: Vec<usize> = (0..mode.c.nrows()).filter(|k| !lost.contains(k)).collect();
-            let a = crate::augmented::scaled(&mode.a, &units.states, &units.states);
-            let c = crate::augmented::scaled(&mode.c, &units.outputs, &units.states);
-            check_detectable(&a, &c.select_rows(&kept), 0.0).is_ok()
-        };
-        self.plant.modes.iter().map(of).collect()
-    }
-
-    /// Standard deviation of each command of a mode under the sensors' noise.
-    fn command_noise(&self, mode: usize) -> Option<Vec<f64>> {
-        let model = self.healthy(mode);
-        let units = self.models.units();
-        let noise = &self.observer.spec.noise;
-        let deviations: Vec<f64> = match noise.len() == units.outputs.len() {
-            true => noise
-                .iter()
-                .zip(&units.outputs)
-                .map(|(d, unit)| d / unit)
-                .collect(),
-            false => vec![0.0; units.outputs.len()],
-        };
-        let found = command_deviation(&model, &deviations)?;
-        let inputs = found.iter().zip(&units.inputs);
-        Some(inputs.map(|(deviation, unit)| deviation * unit).collect())
-    }
-}
-
-/// Standard deviation of each command (m) for that of each sensor (p), all in per-unit.
-fn command_deviation(model: &Loop, deviations: &[f64]) -> Option<Vec<f64>> {
-    let spread = |matrix: &DMatrix<f64>| {
-        let mut scaled = matrix.clone();
-        for (mut column, factor) in scaled.column_iter_mut().zip(deviations) {
-            column *= *factor;
-        }
-        scaled
-    };
-    let b = spread(model.sensors.midpoint());
-    let (c, d) = (
-        model.command.0.midpoint(),
-        spread(model.command.1.midpoint()),
-    );
-    let covariance = riccati::lyapunov(&model.a.midpoint().transpose(), &(&b * b.transpose()))?;
-    let variance = c * covariance * c.transpose() + &d * d.transpose();
-    let variance = variance.diagonal();
-    Some(variance.iter().map(|v| v.max(0.0).sqrt()).collect())
 }
 
 impl RunningLoop {
@@ -404,45 +230,6 @@ fn proved(
         true => Ok(()),
         false => Err(CertificateError::Unproved(BlockName::new(kind, mode, mode))),
     }
-}
-
-/// The gain under arbitrary switching.
-fn prove_switching(subject: &Subject, switching: &SwitchingGain) -> Result<(), CertificateError> {
-    let loops = subject.models.switching(&subject.observer.observer);
-    let arbitrary = subject.control.spec.lyapunov != crate::Lyapunov::Dwell
-        && subject.observer.spec.lyapunov != crate::Lyapunov::Dwell;
-    let size = |matrix: &FactoredLyapunov| [matrix.basis.shape(), matrix.core.shape()];
-    let lyapunov = &switching.lyapunov;
-    let Some(loops) = loops.filter(|_| arbitrary) else {
-        return require(&[(
-            false,
-            "a gain is claimed under a switching that is not proved",
-        )]);
-    };
-    let n = loops[0].2.a.shape().0;
-    require(&[(
-        (lyapunov.len() == 1 || lyapunov.len() == subject.modes())
-            && lyapunov.iter().all(|matrix| size(matrix) == [(n, n); 2])
-            && switching.gamma.is_finite(),
-        "the Lyapunov matrices of the running loop do not have its size",
-    )])?;
-    let matrix = |mode: usize| &lyapunov[if lyapunov.len() == 1 { 0 } else { mode }];
-    for (i, j, model) in &loops {
-        let scaled = subject.scaled(model, &Claim::Disturbance);
-        let level = switching.gamma / scaled.unit;
-        let followers: Vec<usize> = match lyapunov.len() > 1 && i == j {
-            true => (0..subject.modes()).collect(),
-            false => vec![*j],
-        };
-        for next in followers {
-            let after = (lyapunov.len() > 1).then(|| matrix(next));
-            if !scaled.channel().proves_with(level, matrix(*i), after) {
-                let name = BlockName::new(BlockKind::RunningLoop, *i, next);
-                return Err(CertificateError::Unproved(name));
-            }
-        }
-    }
-    Ok(())
 }
 
 /// A row of the table of lost sensors.

@@ -124,7 +124,7 @@ pub enum Objective {
     /// The least l2 gain `gamma` from the disturbance to the performance signal (T2).
     #[default]
     Attenuation,
-    /// Stability with the decay rate only (T1, the sound form of Theorem 1).
+    /// Stability with the decay rate only (T1, the corrected form of Theorem 1).
     Decay,
 }
 

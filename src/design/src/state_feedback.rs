@@ -23,7 +23,7 @@ pub use synthesis::{synthesise, synthesise_with};
 
 pub(crate) use proof::scaled_gain;
 
-use super::certificate::{CertificateError, ControlCertificate};
+use super::certificate::ControlCertificate;
 use super::matrices::{plain, pseudo_inverse_in};
 use super::{ControlSpec, DwellTime};
 use ftc_control::parameters::{self, FeedbackGains};
@@ -87,14 +87,6 @@ impl StateFeedback {
         let units = &self.certificate.units;
         let rejection = REJECTION * units.performance / units.disturbance;
         Some(gamma <= (1.0 + OPTIMALITY) * optimum.max(rejection))
-    }
-
-    /// Proves, from these very doubles, decay, attenuation and dwell time on this plant.
-    ///
-    /// # Errors
-    /// The first inequality that cannot be proved, or what does not fit.
-    pub fn verify(&self, plant: &SwitchedPlant) -> Result<(), CertificateError> {
-        proof::verify(plant, self)
     }
 
     /// What the on-line controller needs of it on this plant. Every inverse is taken here, so that

@@ -1,4 +1,4 @@
-//! What a user should know of a design that is sound: values; the program that shows them adds the words.
+//! What a user should know of a proved design: values; the program that shows them adds the words.
 //!
 //! A warning is no error: nothing that was proved depends on it.
 
@@ -154,7 +154,7 @@ pub fn of_design(design: &Design, logged: Option<&LoggedMovement>) -> Vec<Warnin
     warnings.extend(durations.too_short_to_be_proved(design));
     warnings.extend(durations.too_short_for_transfer(design));
     let alike = apart::pairs(design).into_iter();
-    let alike = alike.filter(|pair| pair.deviations < apart::ENOUGH);
+    let alike = alike.filter(|pair| pair.deviations < apart::LEAST_DEVIATIONS);
     warnings.extend(alike.map(Warning::ModesAlike));
     warnings.extend(costly_observer(design));
     warnings.extend(outside_the_database(design));

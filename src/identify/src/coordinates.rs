@@ -162,8 +162,8 @@ fn between(
         .sum();
     let fit = 100.0 * (1.0 - (missed.norm_squared() / moved).sqrt());
     let map = found.columns(0, n).into_owned();
-    let sound = fit >= LEAST_SWITCH_FIT && condition(&map) < WORST_CONDITION;
-    sound.then(|| (map, found.column(n).into_owned(), fit))
+    let usable = fit >= LEAST_SWITCH_FIT && condition(&map) < WORST_CONDITION;
+    usable.then(|| (map, found.column(n).into_owned(), fit))
 }
 
 fn condition(matrix: &DMatrix<f64>) -> f64 {

@@ -89,8 +89,8 @@ impl Data {
     /// Checks, cuts, centres and scales; a disturbance may have known periods (samples).
     pub fn prepare(logs: &[Log], periods: &[f64]) -> Result<Self, Error> {
         check(logs)?;
-        let sound = |period: &&f64| **period > 2.0 && period.is_finite();
-        if let Some(&period) = periods.iter().find(|period| !sound(period)) {
+        let separable = |period: &&f64| **period > 2.0 && period.is_finite();
+        if let Some(&period) = periods.iter().find(|period| !separable(period)) {
             return Err(Error::Period(period));
         }
         let count = 1 + logs.iter().flat_map(|log| &log.modes).max().unwrap_or(&0);

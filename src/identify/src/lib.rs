@@ -90,6 +90,16 @@ impl Default for Settings {
     }
 }
 
+impl Settings {
+    /// These settings for logs that hold a disturbance of so many seconds with its harmonics, the
+    /// fundamental among them.
+    pub fn with_disturbance(self, period: f64, harmonics: u32, sample_time: f64) -> Self {
+        let samples = |n| period / f64::from(n) / sample_time;
+        let periods = (1..=harmonics).map(samples).collect();
+        Self { periods, ..self }
+    }
+}
+
 /// A linear mode: `x(k+1) - x0 = A (x(k) - x0) + B (u(k) - u0)`, `y(k) - y0 = C (x(k) - x0)`.
 #[derive(Clone, Debug)]
 #[non_exhaustive]

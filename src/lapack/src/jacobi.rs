@@ -1,7 +1,7 @@
 //! Singular values by one-sided Jacobi rotations: slow for large matrices, accurate for all.
 //!
 //! Small singular values come out with high relative accuracy, which is what the scaling of an
-//! interior-point method near its solution lives on, and the number of sweeps is bounded.
+//! interior-point method near its solution needs, and the number of sweeps is bounded.
 
 use nalgebra::{DMatrix, DVector};
 

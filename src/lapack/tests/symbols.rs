@@ -466,7 +466,7 @@ fn singular_vectors_reconstruct_every_shape_and_rank() {
 }
 
 /// Singular values far below the largest keep their digits; an interior-point method's scaling
-/// lives on them.
+/// needs them.
 #[test]
 fn small_singular_values_keep_their_digits() {
     let mut random = Random(6);

@@ -131,7 +131,7 @@ pub struct Merits {
     /// What the sensor says.
     pub measured: Merit,
     /// What the plant does.
-    pub truth: Merit,
+    pub true_output: Merit,
 }
 
 /// The tolerant controller in one of its variants.
@@ -428,8 +428,8 @@ impl Trajectory {
     /// be integrated.
     pub fn merits(&self, tracked: &[usize]) -> Vec<Merits> {
         let mut sums = MeritSums::new(tracked);
-        let sound = |record: &&Record| self.stalled.is_none_or(|end| record.tick <= end);
-        for record in self.records.iter().take_while(sound) {
+        let before_stall = |record: &&Record| self.stalled.is_none_or(|end| record.tick <= end);
+        for record in self.records.iter().take_while(before_stall) {
             sums.add(record);
         }
         sums.merits()
@@ -456,17 +456,17 @@ impl MeritSums {
     /// Adds a sample.
     pub fn add(&mut self, record: &Record) {
         let outputs = self.tracked.iter().zip(&record.reference);
-        for ([measured, truth], (&row, &reference)) in self.sums.iter_mut().zip(outputs) {
+        for ([measured, true_output], (&row, &reference)) in self.sums.iter_mut().zip(outputs) {
             measured.add(record.y[row], reference);
-            truth.add(record.y_true[row], reference);
+            true_output.add(record.y_true[row], reference);
         }
     }
 
     /// The figures of each tracked output.
     pub fn merits(&self) -> Vec<Merits> {
-        let of = |[measured, truth]: &[MeritSum; 2]| Merits {
+        let of = |[measured, true_output]: &[MeritSum; 2]| Merits {
             measured: measured.merit(),
-            truth: truth.merit(),
+            true_output: true_output.merit(),
         };
         self.sums.iter().map(of).collect()
     }

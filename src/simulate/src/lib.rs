@@ -16,7 +16,7 @@
 //! let controller = Controller::new(design.parameters())?;
 //! let simulator = PlantSimulator::new(design.plant.clone(), design.scenario.clone());
 //! let merits = run(&simulator, &controller, Variant::Ftc).merits(&design.controller.feedback.tracked);
-//! assert!(merits[0].truth.mse < 0.05, "{:?}", merits[0]);
+//! assert!(merits[0].true_output.mse < 0.05, "{:?}", merits[0]);
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 

@@ -106,10 +106,10 @@ mod tests {
             (found.mse - 0.25).abs() < 1e-12 && found.vaf == 0.0,
             "{found:?}"
         );
-        let sound = variance(&signal);
+        let expected = variance(&signal);
         let mut sum = MeritSum::default();
         signal.iter().for_each(|&y| sum.add(y, 0.0));
-        assert!((sum.signal.squares / 1000.0 - sound).abs() < 1e-9);
+        assert!((sum.signal.squares / 1000.0 - expected).abs() < 1e-9);
     }
 
     #[test]

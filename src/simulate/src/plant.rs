@@ -2,6 +2,7 @@
 
 mod departure;
 mod derivative;
+mod energy;
 mod injection;
 mod rectifier;
 mod schedule;
@@ -11,11 +12,12 @@ pub use injection::{Injected, LAST_INJECTED_KIND};
 
 use super::integrate::Stalled;
 use departure::Departed;
+use energy::Sampled;
 use ftc_control::state::State;
 use ftc_control::{Matrix, kernel};
 use ftc_design::plain;
 use ftc_plant::TruePlant;
-use ftc_plant::noise;
+use ftc_plant::noise::Noise;
 use ftc_plant::scenario::{FaultEvent, Scenario};
 use ftc_plant::{Deviation, Mode, SwitchedPlant};
 use schedule::{Schedule, Signal};
@@ -29,6 +31,10 @@ pub struct PlantSimulator {
     deviation: Deviation,
     scenario: Scenario,
     schedule: Schedule,
+    /// None where no sensor has any.
+    noise: Option<Noise>,
+    /// A rectifier's, prepared for its sample time.
+    sampled: Option<Sampled>,
     modes: Vec<Dynamics>,
 }
 
@@ -172,9 +178,15 @@ impl PlantSimulator {
     ) -> Self {
         let plant = true_plant.linear(&designed).clone();
         let (true_plant, deviation) = true_plant.into_parts();
+        let sampled = match &true_plant {
+            TruePlant::Rectifier(rectifier) => Sampled::new(rectifier, plant.sample_time),
+            TruePlant::AsDesigned | TruePlant::Linear { .. } | TruePlant::Deviating { .. } => None,
+        };
         Self {
+            sampled,
             modes: plant.modes.iter().map(Dynamics::new).collect(),
             schedule: Schedule::new(&scenario, plant.sample_time),
+            noise: (scenario.noise.iter().any(|&d| d != 0.0)).then(|| Noise::new(scenario.seed)),
             plant,
             true_plant,
             deviation,
@@ -277,8 +289,8 @@ impl PlantSimulator {
             *out = value(signal) + added;
         }
         self.draw_noise(state, external.noise);
-        kernel::affine(&mut state.y_true, &mode.output_offset, &mode.c, &state.x);
-        kernel::add_product(&mut state.y_true, &mode.f, &state.disturbance);
+        let seen = [(&mode.c, &*state.x), (&mode.f, &*state.disturbance)];
+        kernel::affine_sum(&mut state.y_true, &mode.output_offset, seen);
         kernel::bound(&mut state.y_true);
         self.read_sensors(state, built_in);
     }
@@ -302,7 +314,7 @@ impl PlantSimulator {
         let u = applied.as_slice();
         let result = match &self.true_plant {
             TruePlant::Rectifier(rectifier) => rectifier::advance_rectifier(
-                rectifier,
+                (rectifier, self.sampled.as_ref()),
                 state.mode,
                 &mut state.x,
                 u,
@@ -326,27 +338,29 @@ impl PlantSimulator {
         let Some(mode) = self.modes.get(state.mode) else {
             return;
         };
-        kernel::affine(&mut state.next, &mode.state_offset, &mode.a, &state.x);
-        kernel::add_product(&mut state.next, &mode.b, u);
-        kernel::add_product(&mut state.next, &mode.e, &state.disturbance);
+        let moved = [
+            (&mode.a, &*state.x),
+            (&mode.b, u),
+            (&mode.e, &*state.disturbance),
+        ];
+        kernel::affine_sum(&mut state.next, &mode.state_offset, moved);
         kernel::copy(&mut state.x, &state.next);
     }
 
     fn draw_noise(&self, state: &mut PlantState, on: bool) {
-        let deviation = &self.scenario.noise;
-        if !on || deviation.iter().all(|&d| d == 0.0) {
+        let Some(noise) = self.noise.as_ref().filter(|_| on) else {
             state.noise.fill(0.0);
             state.drawn = None;
             return;
-        }
+        };
         if state.drawn.replace(state.tick) == Some(state.tick) {
             return;
         }
-        noise::standard_normal(self.scenario.seed, state.tick, &mut state.noise);
+        noise.draw(state.tick, &mut state.noise);
         state
             .noise
             .iter_mut()
-            .zip(deviation)
+            .zip(&self.scenario.noise)
             .for_each(|(value, d)| *value *= d);
     }
 

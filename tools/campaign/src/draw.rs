@@ -31,7 +31,7 @@ pub struct Drawn {
     /// The experiment.
     pub scenario: Scenario,
     /// The true plant.
-    pub truth: TruePlant,
+    pub true_plant: TruePlant,
     /// Largest relative error of an entry of `A`, `B` or `E`.
     pub model_error: f64,
     /// Noise, relative to the design's scenario.
@@ -88,7 +88,7 @@ pub fn draw(design: &Design, options: &Options, run: u64) -> Drawn {
         .collect();
     let noise = draws.ratio(NOISE);
     let model_error = draws.share() * options.model_error;
-    let truth = truth(design, model_error, &mut draws);
+    let true_plant = true_plant(design, model_error, &mut draws);
     let faults = draws.below(u64::from(options.most_faults) + 1);
     let events = (0..faults)
         .map(|_| fault(design, options, &mut draws))
@@ -105,7 +105,7 @@ pub fn draw(design: &Design, options: &Options, run: u64) -> Drawn {
     scenario.disturbance = disturbance;
     Drawn {
         scenario,
-        truth,
+        true_plant,
         model_error,
         noise,
     }
@@ -189,7 +189,7 @@ fn disturbance(signal: &Waveform, draws: &mut Draws) -> Waveform {
 
 /// Every entry of `A`, `B` and `E` off by a random part of `error`; a nonlinear plant stays what it is, and
 /// so does whatever else the true plant departs by.
-fn truth(design: &Design, error: f64, draws: &mut Draws) -> TruePlant {
+fn true_plant(design: &Design, error: f64, draws: &mut Draws) -> TruePlant {
     let (motion, deviation) = design.true_plant.clone().into_parts();
     let nominal = match motion {
         TruePlant::AsDesigned => design.plant.clone(),

@@ -6,8 +6,23 @@
 //! So any range of runs can be done anywhere ([`run_shard`]), in any number of threads, and
 //! [`merge`] gives the same [`Partial`] to the last digit, whatever the order; runs that two parts
 //! share are refused rather than counted twice.
+//!
+//! ```
+//! # fn main() -> Result<(), Box<dyn std::error::Error>> {
+//! let request = design_file::read("../../examples/paper.toml".as_ref())?.request;
+//! let design = ftc_design::assembly::assemble(request)?;
+//! let options = campaign::Options::default();
+//! let first = campaign::run_shard(&design, &options, 0..3);
+//! let others = campaign::run_shard(&design, &options, 3..8);
+//! let whole = campaign::merge([others, first])?;
+//! assert_eq!(whole, campaign::run_shard(&design, &options, 0..8));
+//! println!("{}", campaign::page::text(&whole));
+//! # Ok(())
+//! # }
+//! ```
 
 mod draw;
+pub mod files;
 mod histogram;
 pub mod page;
 mod partial;
@@ -198,6 +213,24 @@ pub fn run_watched<E>(
         first = last;
     }
     Ok(partial)
+}
+
+/// Does the runs of `range` that `whole` lacks, and returns both together.
+///
+/// # Errors
+/// What `keep` says.
+pub fn complete<E>(
+    mut whole: Partial,
+    (design, options): (&Design, &Options),
+    range: Range<u64>,
+    watch: &Watch,
+    mut keep: impl FnMut(&[Outcome]) -> Result<(), E>,
+) -> Result<Partial, E> {
+    for missing in whole.missing(range) {
+        let part = run_watched(design, options, missing, watch, &mut keep)?;
+        whole.join(part);
+    }
+    Ok(whole)
 }
 
 /// The runs of shard `index` (from 1) of `count`, out of `runs`.

@@ -8,6 +8,7 @@ use report::figure::{Dash, Figure, Ink, Point, Series};
 use report::page::{Block, Column, KeyNumber, Page, Row, Section, Table};
 use report::text::significant;
 use serde_json::{Value, json};
+use std::fmt::Write;
 
 /// Quantiles that are told, and what they are called.
 const QUANTILES: [(f64, &str); 4] = [(0.5, "half"), (0.9, "90 %"), (0.99, "99 %"), (1.0, "worst")];
@@ -104,7 +105,7 @@ fn key_numbers(statistics: &Statistics) -> Vec<KeyNumber> {
         ),
         key(
             rate(statistics),
-            "false alarms in a million samples of a sound sensor",
+            "false alarms in a million samples of a healthy sensor",
         ),
     ]
 }
@@ -127,7 +128,7 @@ fn percent(part: u64, whole: u64) -> String {
 
 fn rate(statistics: &Statistics) -> String {
     let alarms: u64 = statistics.false_alarms.iter().sum();
-    let samples: u64 = statistics.sound_samples.iter().sum();
+    let samples: u64 = statistics.healthy_samples.iter().sum();
     match samples {
         0 => "-".into(),
         _ => significant(1e6 * alarms as f64 / samples as f64),
@@ -315,12 +316,12 @@ fn detection(design: &Design, statistics: &Statistics) -> Section {
         caption: "False alarms".into(),
         columns: vec![
             Column::name("sensor"),
-            Column::number("samples while sound"),
+            Column::number("samples while healthy"),
             Column::number("false alarms"),
         ],
         rows: names(design)
             .iter()
-            .zip(&statistics.sound_samples)
+            .zip(&statistics.healthy_samples)
             .zip(&statistics.false_alarms)
             .map(|((name, samples), alarms)| Row {
                 cells: vec![name.clone(), samples.to_string(), alarms.to_string()],
@@ -396,6 +397,47 @@ fn worst(statistics: &Statistics, whole: &Partial) -> Section {
             whole.options.seed
         )],
     }))
+}
+
+/// The numbers that a person looks at first.
+pub fn text(whole: &Partial) -> String {
+    let statistics = &whole.statistics;
+    let mut text = format!(
+        "{}: {} runs, of which {} without a fault\n\n{:<34}{:>12}{:>12}{:>12}{:>12}\n",
+        whole.design,
+        statistics.runs,
+        statistics.healthy.runs,
+        "true error",
+        "half",
+        "90 %",
+        "99 %",
+        "worst"
+    );
+    for (name, histogram) in [
+        ("with fault tolerance", &statistics.error),
+        ("without", &statistics.error_without),
+        ("told the fault", &statistics.error_told),
+        ("with, over told", &statistics.over_told),
+        ("with, over without", &statistics.over_none),
+        (
+            "with, over without, no fault",
+            &statistics.healthy.over_none,
+        ),
+    ] {
+        let _ = write!(text, "{name:<34}");
+        for (share, _) in QUANTILES {
+            let _ = write!(text, " {:>11}", quantile(histogram, share));
+        }
+        text.push('\n');
+    }
+    let alarms: u64 = statistics.false_alarms.iter().sum();
+    let samples: u64 = statistics.healthy_samples.iter().sum();
+    let _ = writeln!(
+        text,
+        "\nworse than without in {} of {} runs with faults; {alarms} false alarms in {samples} samples of healthy sensors",
+        statistics.worse_than_none, statistics.faulty_runs,
+    );
+    text
 }
 
 /// The same numbers for a program: quantiles, rates, and the parts that merge.

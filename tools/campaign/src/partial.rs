@@ -72,6 +72,18 @@ impl Partial {
         missing
     }
 
+    /// Whether these are runs of this design.
+    pub fn is_of(&self, design: &Design) -> bool {
+        self.fingerprint == fingerprint(design)
+    }
+
+    /// Adds a part with other runs of the same design and options.
+    pub(crate) fn join(&mut self, part: Self) {
+        self.done.extend(part.done);
+        join(&mut self.done);
+        self.statistics.merge(&part.statistics);
+    }
+
     /// Counts runs that follow one another.
     pub(crate) fn add(&mut self, outcomes: &[Outcome]) {
         let (Some(first), Some(last)) = (outcomes.first(), outcomes.last()) else {
@@ -119,9 +131,7 @@ pub fn merge(parts: impl IntoIterator<Item = Partial>) -> Result<Partial, MergeE
         if let Some(run) = shared {
             return Err(MergeError::Overlap(run));
         }
-        whole.done.extend(part.done);
-        join(&mut whole.done);
-        whole.statistics.merge(&part.statistics);
+        whole.join(part);
     }
     Ok(whole)
 }

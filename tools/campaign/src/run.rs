@@ -25,10 +25,10 @@ pub struct Outcome {
     pub error: [f64; 3],
     /// The faults, in the order in which they were drawn.
     pub faults: Vec<FaultDetection>,
-    /// Per sensor (p): how often it was flagged while it was sound.
+    /// Per sensor (p): how often it was flagged while it was healthy.
     pub false_alarms: Vec<u64>,
-    /// Per sensor (p): samples in which it was sound.
-    pub sound_samples: Vec<u64>,
+    /// Per sensor (p): samples in which it was healthy.
+    pub healthy_samples: Vec<u64>,
     /// Where there was one fault: its sensor, and the first sensor flagged while it lasted.
     pub isolation: Option<(usize, Option<usize>)>,
     /// Switches between modes.
@@ -95,7 +95,7 @@ pub fn run_one(design: &Design, controller: &Controller, options: &Options, run:
     let mut detection = Detection::new(design, &drawn);
     let plant = PlantSimulator::with_true_plant(
         design.plant.clone(),
-        drawn.truth.clone(),
+        drawn.true_plant.clone(),
         drawn.scenario.clone(),
     );
     let error = [Variant::Ftc, Variant::NoFtc, Variant::ToldTheFault].map(|variant| {
@@ -120,7 +120,7 @@ pub fn run_one(design: &Design, controller: &Controller, options: &Options, run:
 
 /// The most unstable of the modes that the true plant's matrices make unstable.
 fn unstable(design: &Design, drawn: &Drawn) -> Option<(usize, f64)> {
-    let lost = drawn.truth.linear(&design.plant);
+    let lost = drawn.true_plant.linear(&design.plant);
     let lost = lost.destabilised(&design.plant);
     let largest = lost.iter().max_by(|a, b| a.radius.total_cmp(&b.radius))?;
     Some((largest.mode, largest.radius))
@@ -143,7 +143,7 @@ struct Detection {
     faults: Vec<FaultDetection>,
     flagged: Vec<bool>,
     false_alarms: Vec<u64>,
-    sound_samples: Vec<u64>,
+    healthy_samples: Vec<u64>,
     flagged_first: Option<usize>,
 }
 
@@ -166,7 +166,7 @@ impl Detection {
             faults,
             flagged: vec![false; sensors],
             false_alarms: vec![0; sensors],
-            sound_samples: vec![0; sensors],
+            healthy_samples: vec![0; sensors],
             flagged_first: None,
         }
     }
@@ -179,7 +179,7 @@ impl Detection {
             let excused =
                 own.any(|fault| (fault.from..fault.until + DETECTION_WINDOW).contains(&tick));
             if !excused {
-                self.sound_samples[sensor] += 1;
+                self.healthy_samples[sensor] += 1;
                 self.false_alarms[sensor] += u64::from(raised);
             }
             let before = self.flagged[sensor];
@@ -213,7 +213,7 @@ impl Detection {
             error,
             faults: self.faults,
             false_alarms: self.false_alarms,
-            sound_samples: self.sound_samples,
+            healthy_samples: self.healthy_samples,
             isolation,
             switches: drawn.scenario.schedule.len() as u64 - 1,
             model_error: drawn.model_error,

@@ -34,11 +34,11 @@ pub struct Statistics {
     pub kinds: BTreeMap<String, KindStatistics>,
     /// Of runs with one fault: `[faulty sensor][sensor flagged first, or p where none was]`.
     pub isolation: Vec<Vec<u64>>,
-    /// How often sound sensors were flagged, per sensor (p).
+    /// How often healthy sensors were flagged, per sensor (p).
     pub false_alarms: Vec<u64>,
-    /// Samples in which a sensor was sound, per sensor (p).
-    pub sound_samples: Vec<u64>,
-    /// Runs in which a sound sensor was flagged.
+    /// Samples in which a sensor was healthy, per sensor (p).
+    pub healthy_samples: Vec<u64>,
+    /// Runs in which a healthy sensor was flagged.
     pub runs_with_false_alarm: u64,
     /// Of the runs without a fault.
     pub healthy: Healthy,
@@ -137,7 +137,7 @@ impl Statistics {
         Self {
             isolation: vec![vec![0; sensors + 1]; sensors],
             false_alarms: vec![0; sensors],
-            sound_samples: vec![0; sensors],
+            healthy_samples: vec![0; sensors],
             ..Self::default()
         }
     }
@@ -178,7 +178,7 @@ impl Statistics {
             row[flagged.unwrap_or(none)] += 1;
         }
         add_all(&mut self.false_alarms, &outcome.false_alarms);
-        add_all(&mut self.sound_samples, &outcome.sound_samples);
+        add_all(&mut self.healthy_samples, &outcome.healthy_samples);
         self.runs_with_false_alarm += u64::from(flagged);
         self.rank([Worst {
             run: outcome.run,
@@ -208,7 +208,7 @@ impl Statistics {
             add_all(row, other);
         }
         add_all(&mut self.false_alarms, &other.false_alarms);
-        add_all(&mut self.sound_samples, &other.sound_samples);
+        add_all(&mut self.healthy_samples, &other.healthy_samples);
         self.runs_with_false_alarm += other.runs_with_false_alarm;
         self.healthy.merge(&other.healthy);
         self.unstable_plants += other.unstable_plants;

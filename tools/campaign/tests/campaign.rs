@@ -151,7 +151,7 @@ fn what_is_drawn_stays_in_its_bounds() {
                     == std::mem::discriminant(&ftc_plant::scenario::FaultKind::Stuck),
             );
         }
-        let TruePlant::Linear { plant } = &drawn.truth else {
+        let TruePlant::Linear { plant } = &drawn.true_plant else {
             panic!("no linear plant")
         };
         let nominal = &design().plant.modes[0].a;

@@ -1,36 +1,20 @@
 //! `campaign`: thousands of seeded random runs, in threads, shards and sittings.
 
-use crate::failure::Failure;
-use crate::progress::Progress;
-use crate::{Made, check_output};
-use campaign::page::quantile;
-use campaign::rows::RowWriter;
+use crate::failure::option;
+use crate::progress::{Progress, Runs};
+use crate::{check_output, failure::Failure};
+use campaign::files::{self, PAGE, RESULT, RowFile};
 use campaign::{Options, Partial, Watch};
 use clap::Args;
 use ftc_design::Design;
-use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
-use package::Replacement;
-use package::output::Staging;
+use report::Made;
 use std::fmt::Write as _;
-use std::io::IsTerminal;
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
-use std::sync::atomic::Ordering;
-use std::time::{Duration, Instant};
 
-/// Name of the result that merges.
-const RESULT: &str = "campaign.json";
-/// The largest that is read, in bytes: it holds counts, however many runs there were.
-const LARGEST_RESULT: u64 = 256 << 20;
-/// Name of the page.
-const PAGE: &str = "campaign.html";
-/// Name of the file with a row per run.
-const ROWS: &str = "runs.parquet";
 /// Runs of a campaign, where no number is given.
 const RUNS: u64 = 1000;
-/// How often a sign of life is printed where there is no terminal.
-const LINE_EVERY: Duration = Duration::from_secs(10);
 
 /// The arguments of `campaign`.
 #[derive(Args)]
@@ -96,10 +80,7 @@ impl Arguments {
     pub fn check(&self) -> Result<(), Failure> {
         check_output(&self.out)?;
         let checked = self.options().check();
-        checked.map_err(|error| {
-            let option = error.option().replace('_', "-");
-            Failure::Input(format!("--{option}: {error}"))
-        })
+        checked.map_err(|error| refused(&option(error.option()), error))
     }
 
     fn options(&self) -> Options {
@@ -123,6 +104,11 @@ impl Arguments {
     }
 }
 
+/// An option that does not fit.
+fn refused(option: &str, what: impl std::fmt::Display) -> Failure {
+    Failure::Input(format!("{option}: {what}"))
+}
+
 /// Does the campaign and returns what to print.
 pub fn run(
     made: Made,
@@ -132,7 +118,7 @@ pub fn run(
 ) -> Result<String, Failure> {
     if arguments.model_error.is_some() {
         let checked = arguments.options().check_model_error(&made.design);
-        checked.map_err(|what| Failure::Input(format!("--model-error: {what}")))?;
+        checked.map_err(|what| refused("--model-error", what))?;
     }
     if let Some(run) = arguments.replay {
         return replay(made, arguments, run, &progress);
@@ -143,16 +129,7 @@ pub fn run(
         true => work(design, arguments, quiet)?,
         false => merge(design, arguments)?,
     };
-    let staging = Staging::new(&arguments.out).map_err(Failure::output_directory)?;
-    let json = format!("{:#}\n", campaign::page::json(&whole, asked));
-    staging
-        .add(RESULT, json.as_bytes())
-        .map_err(Failure::output_directory)?;
-    let page = campaign::page::html(design, &whole, asked);
-    staging
-        .add(PAGE, page.as_bytes())
-        .map_err(Failure::output_directory)?;
-    staging.commit().map_err(Failure::output_directory)?;
+    files::write(&arguments.out, design, &whole, asked)?;
     let mut warnings = made.warnings;
     warnings.extend(campaign::page::unstable(&made.design, &whole).map(small));
     Ok(summary(&whole, asked, arguments) + &report::warnings::text(&warnings))
@@ -167,35 +144,30 @@ fn replay(
 ) -> Result<String, Failure> {
     let drawn = campaign::draw(&made.design, &arguments.options(), run);
     made.design.scenario = drawn.scenario;
-    made.design.true_plant = drawn.truth;
+    made.design.true_plant = drawn.true_plant;
     crate::simulate(made, &arguments.design, &arguments.out, false, progress)
 }
 
 /// Reads the results of shards and puts them together.
 fn merge(design: &Design, arguments: &Arguments) -> Result<(Partial, u64), Failure> {
-    let parts: Result<Vec<(Partial, u64)>, Failure> =
-        arguments.merge.iter().map(|path| read(path)).collect();
-    let (parts, asked): (Vec<Partial>, Vec<u64>) = parts?.into_iter().unzip();
-    let together = asked
+    let parts: Result<Vec<(Partial, u64)>, files::Error> = arguments
+        .merge
         .iter()
-        .fold(0, |sum: u64, &runs| sum.saturating_add(runs));
-    let whole =
-        campaign::merge(parts).map_err(|error| Failure::Input(format!("--merge: {error}")))?;
-    if whole.fingerprint != Partial::new(design, &whole.options).fingerprint {
-        return Err(Failure::Input(format!(
-            "--merge: the parts belong to another design than {}: name the design file they were made with",
-            arguments.design.display()
-        )));
+        .map(|path| files::read(path))
+        .collect();
+    let (parts, asked): (Vec<Partial>, Vec<u64>) = parts?.into_iter().unzip();
+    let together = asked.into_iter().fold(0, u64::saturating_add);
+    let whole = campaign::merge(parts).map_err(|error| refused("--merge", error))?;
+    if !whole.is_of(design) {
+        let file = arguments.design.display();
+        return Err(refused(
+            "--merge",
+            format!(
+                "the parts belong to another design than {file}: name the design file they were made with"
+            ),
+        ));
     }
     Ok((whole, arguments.runs.unwrap_or(together)))
-}
-
-fn read(path: &Path) -> Result<(Partial, u64), Failure> {
-    let text = ftc_tables::read_regular(path, LARGEST_RESULT)
-        .map_err(|error| error.to_string())
-        .map(|bytes| String::from_utf8_lossy(&bytes).into_owned());
-    text.and_then(|text| campaign::page::read(&text).map_err(|error| error.to_string()))
-        .map_err(|what| Failure::Input(format!("{}: {what}", path.display())))
 }
 
 /// Does the runs that are missing.
@@ -204,204 +176,51 @@ fn work(design: &Design, arguments: &Arguments, quiet: bool) -> Result<(Partial,
     let mut whole = Partial::new(design, &options);
     let mut asked = None;
     if arguments.resume {
-        let (before, runs) = read(&arguments.out.join(RESULT))?;
+        let (before, runs) = files::read(&arguments.out.join(RESULT))?;
         asked = Some(runs);
-        whole = campaign::merge([whole, before])
-            .map_err(|error| Failure::Input(format!("--resume: {error}")))?;
+        whole = campaign::merge([whole, before]).map_err(|error| refused("--resume", error))?;
     }
     let watch = Arc::new(Watch::default());
     crate::interrupt::stop(&watch);
     let range = arguments.range(asked)?;
     let missing = whole.missing(range.clone());
     let count = missing.iter().map(|range| range.end - range.start).sum();
-    let pool = rayon::ThreadPoolBuilder::new()
-        .num_threads(arguments.jobs.map_or(0, usize::from))
-        .build()
-        .map_err(|error| Failure::Input(format!("--jobs: no threads ({error}): give fewer")))?;
+    let pool = crate::pool("--jobs", arguments.jobs.map_or(0, usize::from))?;
+    let unwritten = |error: output::Error| Failure::Input(error.to_string());
     let mut rows = match arguments.rows {
-        true => Some(Rows::new(&arguments.out)?),
+        true => Some(RowFile::new(&arguments.out).map_err(unwritten)?),
         false => None,
     };
-    std::thread::scope(|scope| {
-        let _sign = Sign::new(scope, Arc::clone(&watch), count, quiet);
-        for range in missing {
-            let part = pool.install(|| {
-                campaign::run_watched(design, &options, range, &watch, |outcomes| {
-                    rows.as_mut().map_or(Ok(()), |rows| rows.write(outcomes))
-                })
-            })?;
-            whole = campaign::merge([
-                std::mem::replace(&mut whole, Partial::new(design, &options)),
-                part,
-            ])
-            .map_err(|error| Failure::Input(error.to_string()))?;
-        }
-        Ok::<(), Failure>(())
-    })?;
+    let whole = std::thread::scope(|scope| {
+        let _shown = Runs::show(scope, Arc::clone(&watch), count, quiet);
+        pool.install(|| {
+            campaign::complete(
+                whole,
+                (design, &options),
+                range.clone(),
+                &watch,
+                |outcomes| rows.as_mut().map_or(Ok(()), |rows| rows.write(outcomes)),
+            )
+        })
+    });
+    let whole = whole.map_err(unwritten)?;
     if let Some(rows) = rows {
-        rows.keep()?;
+        rows.keep().map_err(unwritten)?;
     }
     Ok((whole, range.end - range.start))
 }
 
-/// The Parquet file, under another name until it is complete.
-struct Rows {
-    writer: RowWriter<std::fs::File>,
-    replacement: Replacement,
-}
-
-impl Rows {
-    fn new(out: &Path) -> Result<Self, Failure> {
-        let target = &out.join(ROWS);
-        let made = std::fs::create_dir_all(out).and_then(|()| {
-            let replacement = Replacement::of(target)?;
-            Ok((replacement.file()?, replacement))
-        });
-        let (file, replacement) = made.map_err(|error| blame(target, &error))?;
-        let writer = RowWriter::new(file).map_err(|error| unwritten(target, error))?;
-        Ok(Self {
-            writer,
-            replacement,
-        })
-    }
-
-    fn write(&mut self, outcomes: &[campaign::Outcome]) -> Result<(), Failure> {
-        self.writer
-            .write(outcomes)
-            .map_err(|error| unwritten(self.replacement.target(), error))
-    }
-
-    fn keep(self) -> Result<(), Failure> {
-        let target = self.replacement.target().to_path_buf();
-        self.writer
-            .finish()
-            .map_err(|error| unwritten(&target, error))?;
-        self.replacement
-            .keep()
-            .map_err(|error| blame(&target, &error))
-    }
-}
-
-fn blame(path: &Path, error: &std::io::Error) -> Failure {
-    let what = package::output::unwritten(error, "directory");
-    Failure::Input(format!("{}: {what}", path.display()))
-}
-
-/// What the file system said, where the Parquet writer passes it on.
-fn unwritten(path: &Path, error: campaign::rows::Error) -> Failure {
-    let error = match error {
-        campaign::rows::Error::External(error) => match error.downcast::<std::io::Error>() {
-            Ok(error) => *error,
-            Err(error) => std::io::Error::other(error),
-        },
-        error => std::io::Error::other(error),
-    };
-    blame(path, &error)
-}
-
-/// A bar with the time that remains on a terminal, a line every ten seconds elsewhere; ends when dropped.
-struct Sign(Arc<std::sync::atomic::AtomicBool>);
-
-impl Sign {
-    fn new<'scope>(
-        scope: &'scope std::thread::Scope<'scope, '_>,
-        watch: Arc<Watch>,
-        count: u64,
-        quiet: bool,
-    ) -> Self {
-        let over = Arc::new(std::sync::atomic::AtomicBool::new(quiet));
-        let ends = Arc::clone(&over);
-        scope.spawn(move || match std::io::stderr().is_terminal() {
-            true => bar(&watch, count, &ends),
-            false => lines(&watch, count, &ends),
-        });
-        Self(over)
-    }
-}
-
-impl Drop for Sign {
-    fn drop(&mut self) {
-        self.0.store(true, Ordering::Relaxed);
-    }
-}
-
-fn bar(watch: &Watch, count: u64, over: &std::sync::atomic::AtomicBool) {
-    let bar = ProgressBar::with_draw_target(Some(count), ProgressDrawTarget::stderr());
-    if let Ok(style) = ProgressStyle::with_template("{bar:30} {pos} of {len} runs, {eta} left") {
-        bar.set_style(style);
-    }
-    while !over.load(Ordering::Relaxed) {
-        bar.set_position(watch.done.load(Ordering::Relaxed));
-        std::thread::sleep(Duration::from_millis(100));
-    }
-    bar.finish_and_clear();
-}
-
-fn lines(watch: &Watch, count: u64, over: &std::sync::atomic::AtomicBool) {
-    let (start, mut next) = (Instant::now(), LINE_EVERY);
-    while !over.load(Ordering::Relaxed) {
-        std::thread::sleep(Duration::from_millis(50));
-        let (spent, done) = (start.elapsed(), watch.done.load(Ordering::Relaxed));
-        if spent < next || done == 0 {
-            continue;
-        }
-        next = spent + LINE_EVERY;
-        let left = spent.as_secs_f64() * count.saturating_sub(done) as f64 / done as f64;
-        eprintln!("{done} of {count} runs, {left:.0} s left");
-    }
-}
-
 fn summary(whole: &Partial, asked: u64, arguments: &Arguments) -> String {
-    let statistics = &whole.statistics;
-    let mut text = format!(
-        "{}: {} runs, of which {} without a fault\n\n{:<34}{:>12}{:>12}{:>12}{:>12}\n",
-        whole.design,
-        statistics.runs,
-        statistics.healthy.runs,
-        "true error",
-        "half",
-        "90 %",
-        "99 %",
-        "worst"
-    );
-    for (name, histogram) in [
-        ("with fault tolerance", &statistics.error),
-        ("without", &statistics.error_without),
-        ("told the fault", &statistics.error_told),
-        ("with, over told", &statistics.over_told),
-        ("with, over without", &statistics.over_none),
-        (
-            "with, over without, no fault",
-            &statistics.healthy.over_none,
-        ),
-    ] {
-        let _ = write!(text, "{name:<34}");
-        for share in [0.5, 0.9, 0.99, 1.0] {
-            let _ = write!(text, " {:>11}", quantile(histogram, share));
-        }
-        text.push('\n');
-    }
-    let alarms: u64 = statistics.false_alarms.iter().sum();
-    let samples: u64 = statistics.sound_samples.iter().sum();
-    let _ = writeln!(
-        text,
-        "\nworse than without in {} of {} runs with faults; {alarms} false alarms in {samples} samples of sound sensors\n\
-         wrote {} and {}",
-        statistics.worse_than_none,
-        statistics.faulty_runs,
-        arguments.out.join(PAGE).display(),
-        RESULT
-    );
-    if statistics.runs < asked {
-        let _ = writeln!(
-            text,
-            "warning: {} of {asked} runs were done: {}",
-            statistics.runs,
-            match arguments.merge.is_empty() {
-                true => "go on with --resume",
-                false => "merge the other shards, too",
-            }
-        );
+    let page = arguments.out.join(PAGE);
+    let mut text = campaign::page::text(whole);
+    let _ = writeln!(text, "wrote {} and {RESULT}", page.display());
+    let runs = whole.runs();
+    if runs < asked {
+        let more = match arguments.merge.is_empty() {
+            true => "go on with --resume",
+            false => "merge the other shards, too",
+        };
+        let _ = writeln!(text, "warning: {runs} of {asked} runs were done: {more}");
     }
     text
 }

@@ -47,11 +47,6 @@ impl Failure {
         }
     }
 
-    /// An output directory that cannot be written to.
-    pub fn output_directory(error: package::output::Error) -> Self {
-        Self::Input(format!("--out {error}"))
-    }
-
     /// The same failure, with a JSON object for standard output where there is a verdict.
     pub fn explained_in_json(self) -> Self {
         match self {
@@ -90,13 +85,30 @@ impl From<String> for Failure {
     }
 }
 
+impl From<output::Error> for Failure {
+    fn from(error: output::Error) -> Self {
+        Self::Input(format!("--out {error}"))
+    }
+}
+
 impl From<package::Error> for Failure {
     fn from(error: package::Error) -> Self {
         match error {
-            package::Error::Output(error) => Self::output_directory(error),
+            package::Error::Output(error) => error.into(),
             error => Self::Input(error.to_string()),
         }
     }
+}
+
+impl From<campaign::files::Error> for Failure {
+    fn from(error: campaign::files::Error) -> Self {
+        Self::Input(error.to_string())
+    }
+}
+
+/// The option that gives the value of this key.
+pub fn option(key: &str) -> String {
+    format!("--{}", key.replace('_', "-"))
 }
 
 impl fmt::Display for Failure {

@@ -17,7 +17,7 @@ pub fn listen() {
             .get()
             .map(|watch| watch.stop.swap(true, Ordering::Relaxed));
         if stopped != Some(false) {
-            package::abandon();
+            output::abandon();
             std::process::exit(INTERRUPTED);
         }
     });

@@ -2,7 +2,9 @@
 //!
 //! ```text
 //! DESIGN.toml ── design-file ──> ftc_design ──┬─> report    (design, simulate)
+//!                                              ├─> campaign  (random runs)
 //!                                              └─> package   (export: two FMUs)
+//!                  logs ── design-file ──> DESIGN.toml       (identify)
 //!                         FMU ────────────────────> package  (verify: the proof, once more)
 //!
 //! examples ── reproduce ──> a page, JSON and CSV per experiment of the paper
@@ -11,28 +13,23 @@
 //! The program reads arguments, calls these libraries, words what they return, and decides the exit
 //! code.
 
-mod as_printed;
 mod campaigns;
-mod estimate;
-pub mod examples;
 mod failure;
 mod identification;
 mod interrupt;
 mod progress;
-mod solved;
 
 use clap::{Parser, Subcommand, ValueEnum};
-use design_file::Loaded;
+use design_file::{Loaded, examples};
 use failure::Failure;
+use ftc_design::as_printed::{theorem_1, theorem_2};
 use ftc_design::assembly::Request;
-use ftc_design::warnings::LoggedMovement;
 use ftc_design::{Design, Run, Solver, Step};
-use ftc_simulate::Variant;
-use ftc_simulate::closed_loop::Record;
-use package::output::Staging;
+use output::Staging;
+use package::solved::{self, LoadError};
 use progress::Progress;
-use report::simulate::{Samples, SimulateError, TableOfSamples};
-use report::{summary, warnings};
+use report::simulate::{Extent, SimulateError, simulate_into};
+use report::{Made, Source, as_printed, estimate, summary, warnings};
 use serde_json::json;
 use std::ffi::OsString;
 use std::fmt::Write as _;
@@ -179,7 +176,7 @@ enum Command {
     /// simulation, and the fit on data held out is printed. Where the log holds switches between
     /// modes, the models share one state.
     #[command(after_help = EXIT_CODES)]
-    Identify(identification::Asked),
+    Identify(identification::Arguments),
     /// Write an example to start from: a design file, or a Python script from physics to FMUs.
     ///
     /// Without a name the examples are listed.
@@ -298,7 +295,7 @@ fn run(
         } => {
             let request = read(design, &progress)?.request;
             progress.tell("looking for a margin");
-            as_printed::report(design, request, *json)
+            theorems_as_printed(design, &request, *json)
         }
         Command::Design {
             design, json, save, ..
@@ -360,7 +357,7 @@ fn run(
             check_output(&folder)?;
             progress.tell("identifying");
             let (text, found) = identification::identify(asked)?;
-            write(&folder, &[(name.clone(), text.into_bytes())])?;
+            output::write(&folder, &[(name.clone(), text.into_bytes())])?;
             Ok(format!("{found}wrote {}\n", folder.join(name).display()))
         }
         Command::Example { name: None, .. } => Ok(examples::list()),
@@ -368,8 +365,8 @@ fn run(
             name: Some(name),
             out,
         } => {
-            let files = examples::files(name)?;
-            write(out, &files)?;
+            let files = examples::files(name).map_err(|error| Failure::Input(error.to_string()))?;
+            output::write(out, &files)?;
             let paths = files
                 .iter()
                 .map(|(file, _)| format!("wrote {}\n", out.join(file).display()));
@@ -379,6 +376,31 @@ fn run(
             check_output(out)?;
             reproduce(*experiment, out, &progress)
         }
+    }
+}
+
+/// The paper's Theorems 1 and 2 as they stand.
+fn theorems_as_printed(path: &Path, request: &Request, json: bool) -> Result<String, Failure> {
+    let solve = || {
+        Ok([
+            ("Theorem 1", theorem_1(&request.plant)?),
+            ("Theorem 2", theorem_2(&request.plant, &request.control)?),
+        ])
+    };
+    let verdicts = solve().map_err(|error: ftc_design::DesignError| {
+        Failure::new(path, request.control.clone(), error.into())
+    })?;
+    let output = match json {
+        true => as_printed::json(&verdicts),
+        false => as_printed::text(&request.name, &verdicts),
+    };
+    match as_printed::infeasible(&verdicts) {
+        None => Ok(output),
+        Some(what) => Err(Failure::Refused {
+            file: path.display().to_string(),
+            what: format!("{what}: design without --as-printed"),
+            output: Some(output),
+        }),
     }
 }
 
@@ -426,26 +448,7 @@ fn export(
         sign: sign.map(Path::to_path_buf),
     };
     let exported = package::export(&made.design, &options)?;
-    let mut text = String::new();
-    for path in &exported.paths {
-        let _ = writeln!(text, "wrote {}", path.display());
-    }
-    let _ = writeln!(text, "coupling: {}", exported.coupling);
-    let platforms: Vec<String> = exported
-        .packed
-        .iter()
-        .map(|packed| match packed.native {
-            true => format!("{} (built for this machine)", packed.platform),
-            false => packed.platform.into(),
-        })
-        .collect();
-    let _ = writeln!(text, "platforms: {}", platforms.join(", "));
-    for platform in &exported.outdated {
-        let _ = writeln!(
-            text,
-            "left out {platform}: its binaries are older than this program's: run make fmu-all"
-        );
-    }
+    let mut text = exported.to_string();
     text += &warnings::text(exported.misfit.as_slice());
     Ok(text + &warnings::text(&made.warnings))
 }
@@ -470,33 +473,21 @@ fn simulate(
     baselines: bool,
     progress: &Progress,
 ) -> Result<String, Failure> {
-    let staging = Staging::new(out).map_err(Failure::output_directory)?;
-    let mut outcome = None;
-    let written = staging.add_written(report::simulate::TABLE, |file| {
-        let mut samples = Shown {
-            table: TableOfSamples::new(file, made.design.plant.sample_time),
-            progress,
-            done: 0,
-            steps: made.design.scenario.steps,
-        };
-        progress.tell("simulating");
-        let found =
-            report::simulate::simulate(&made.design, made.warnings, baselines, &mut samples);
-        if let Err(SimulateError::Samples(error)) = found {
-            return Err(error);
+    progress.tell("simulating");
+    let steps = made.design.scenario.steps;
+    let told = |done: u64| {
+        if done.is_multiple_of(BETWEEN_WORDS) {
+            progress.tell(match done == steps {
+                true => "simulating plants that are not quite the model".into(),
+                false => format!("simulating, {} % of {steps} samples", 100 * done / steps),
+            });
         }
-        outcome = Some(found);
-        samples.table.finish()
-    });
-    written.map_err(Failure::output_directory)?;
-    let found = match outcome {
-        Some(Ok(found)) => found,
-        Some(Err(error)) => return Err(Failure::Input(format!("{}: {error}", file.display()))),
-        None => return Err(Failure::Input("nothing was simulated".into())),
     };
-    add(&staging, &found.files)
-        .and_then(|()| staging.commit())
-        .map_err(Failure::output_directory)?;
+    let found = simulate_into(out, &made.design, made.warnings, baselines, &told);
+    let found = found.map_err(|error| match error {
+        SimulateError::Output(error) => error.into(),
+        error => Failure::Input(format!("{}: {error}", file.display())),
+    })?;
     let mut text = found.summary;
     let _ = writeln!(
         text,
@@ -504,28 +495,6 @@ fn simulate(
         out.join("report.html").display()
     );
     Ok(text + &warnings::text(&found.warnings))
-}
-
-/// The table of samples, with a word from time to time.
-struct Shown<'a, W: Write> {
-    table: TableOfSamples<W>,
-    progress: &'a Progress,
-    done: u64,
-    steps: u64,
-}
-
-impl<W: Write> Samples for Shown<'_, W> {
-    fn take(&mut self, runs: &[(Variant, Record)]) -> std::io::Result<()> {
-        self.done += 1;
-        if self.done.is_multiple_of(BETWEEN_WORDS) {
-            let (done, steps) = (self.done, self.steps);
-            self.progress.tell(match done == steps {
-                true => "simulating plants that are not quite the model".into(),
-                false => format!("simulating, {} % of {steps} samples", 100 * done / steps),
-            });
-        }
-        self.table.take(runs)
-    }
 }
 
 /// Runs an experiment of the paper and writes its page.
@@ -536,7 +505,7 @@ fn reproduce(experiment: Experiment, out: &Path, progress: &Progress) -> Result<
     };
     let found = reproduce::run(experiment, &|what| progress.tell(what))
         .map_err(|error| Failure::Input(error.to_string()))?;
-    write(out, &found.files)?;
+    output::write(out, &found.files)?;
     let name = found.name;
     Ok(format!(
         "{}\nwrote {}, {name}.json and {name}.csv\n",
@@ -547,36 +516,13 @@ fn reproduce(experiment: Experiment, out: &Path, progress: &Progress) -> Result<
 
 /// Refuses an output directory that cannot be written to, before anything long is begun.
 fn check_output(out: &Path) -> Result<(), Failure> {
-    Staging::new(out)
-        .map(drop)
-        .map_err(Failure::output_directory)
-}
-
-/// Writes all files, or none.
-fn write(out: &Path, files: &[(String, Vec<u8>)]) -> Result<(), Failure> {
-    let staging = Staging::new(out).map_err(Failure::output_directory)?;
-    add(&staging, files)
-        .and_then(|()| staging.commit())
-        .map(drop)
-        .map_err(Failure::output_directory)
-}
-
-fn add(staging: &Staging, files: &[(String, Vec<u8>)]) -> Result<(), package::output::Error> {
-    files
-        .iter()
-        .try_for_each(|(name, bytes)| staging.add(name, bytes))
+    Ok(Staging::new(out).map(drop)?)
 }
 
 /// Reads a design file.
 fn read(path: &Path, progress: &Progress) -> Result<Loaded, Failure> {
     progress.tell("reading the design file");
     design_file::read(path).map_err(|error| Failure::Input(error.to_string()))
-}
-
-/// A design, and what its user should know of it: one sentence each.
-struct Made {
-    design: Design,
-    warnings: Vec<String>,
 }
 
 /// How a design comes about.
@@ -594,47 +540,75 @@ struct How<'a> {
 
 /// Reads a design file and makes the design, or takes it from where it was kept.
 fn solve(path: &Path, how: &How, progress: &Progress) -> Result<Made, Failure> {
-    let Loaded {
-        file,
-        request,
-        notes,
-        ..
-    } = read(path, progress)?;
-    estimate::announce(path, &request, how, progress)?;
+    let (request, source) = Source::split(read(path, progress)?);
+    announce(path, &request, how, progress)?;
     let asked = request.control.clone();
-    let logged = LoggedMovement::of(&request.estimator.database);
     let key = solved::key(&request, how.solver);
     let design = match how.solved {
         Some(file) => {
             progress.tell("proving again what was solved");
-            solved::load(file, &key)?
+            kept(file, &key)?
         }
         None => {
-            let made = in_threads(how.threads, || synthesised(request, how.solver, progress))?;
+            let work = || synthesised(request, how.solver, progress);
+            let made = match how.threads {
+                1 => work(),
+                threads => pool("--threads", threads)?.install(work),
+            };
             made.map_err(|error| {
-                eprint!("{}", warnings::text(&notes));
+                eprint!("{}", warnings::text(&source.notes));
                 Failure::new(path, asked, error)
             })?
         }
     };
     if let Some(file) = how.save {
-        solved::save(file, key, &design)?;
+        solved::save(file, key, &design)
+            .map_err(|error| Failure::Input(format!("--save {}: {error}", file.display())))?;
     }
-    let mut warnings = notes;
-    warnings.extend(warnings::of_design(&file, logged.as_ref(), &design));
-    Ok(Made { design, warnings })
+    Ok(source.made(design))
 }
 
-/// Does work that may use so many threads.
-fn in_threads<T: Send>(threads: usize, work: impl FnOnce() -> T + Send) -> Result<T, Failure> {
-    if threads == 1 {
-        return Ok(work());
+/// Says what will take long or much, and refuses what no usual machine has.
+fn announce(
+    file: &Path,
+    request: &Request,
+    how: &How<'_>,
+    progress: &Progress,
+) -> Result<(), Failure> {
+    let design = match how.solved {
+        None => estimate::design(request, how.threads),
+        Some(_) => None,
+    };
+    let mut simulation = None;
+    if let Some(baselines) = how.played {
+        let (size, tracked) = (request.plant.dimensions(), request.control.tracked.len());
+        let extent = Extent::new(size, tracked, request.scenario.steps, baselines);
+        extent
+            .check()
+            .map_err(|error| Failure::Input(format!("{}: {error}", file.display())))?;
+        simulation = estimate::simulation(&extent);
     }
-    let pool = rayon::ThreadPoolBuilder::new()
-        .num_threads(threads)
-        .build()
-        .map_err(|error| Failure::Input(format!("--threads: no threads ({error}): give fewer")))?;
-    Ok(pool.install(work))
+    for words in design.iter().chain(&simulation) {
+        progress.announce(words);
+    }
+    Ok(())
+}
+
+/// The design that an earlier call kept.
+fn kept(file: &Path, key: &str) -> Result<Design, Failure> {
+    solved::load(file, key).map_err(|error| {
+        let again = match error {
+            LoadError::Unusable(_) => ": make it again with ftc-fmu design --save",
+            _ => "",
+        };
+        Failure::Input(format!("--solved {}: {error}{again}", file.display()))
+    })
+}
+
+/// So many threads, which an option asked for; 0: as many as the machine has.
+fn pool(option: &str, threads: usize) -> Result<rayon::ThreadPool, Failure> {
+    let built = rayon::ThreadPoolBuilder::new().num_threads(threads).build();
+    built.map_err(|error| Failure::Input(format!("{option}: no threads ({error}): give fewer")))
 }
 
 /// Solves for a design and says how far it has come.

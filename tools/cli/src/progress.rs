@@ -1,9 +1,11 @@
 //! What the program is doing, shown while it runs: a spinner on a terminal, elsewhere a line from
 //! time to time.
 
-use indicatif::{ProgressBar, ProgressDrawTarget};
+use campaign::Watch;
+use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use std::fmt;
 use std::io::IsTerminal;
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{self, RecvTimeoutError, Sender};
 use std::sync::{Arc, Mutex};
 use std::thread::JoinHandle;
@@ -125,5 +127,59 @@ impl Drop for Lines {
         if let Some(thread) = self.thread.take() {
             let _ = thread.join();
         }
+    }
+}
+
+/// How many runs of a campaign are done: a bar with the time that remains on a terminal, a line from
+/// time to time elsewhere. Ends when dropped.
+pub struct Runs(Arc<AtomicBool>);
+
+impl Runs {
+    /// Shows how far `watch` has come of so many runs, unless `quiet`.
+    pub fn show<'scope>(
+        scope: &'scope std::thread::Scope<'scope, '_>,
+        watch: Arc<Watch>,
+        count: u64,
+        quiet: bool,
+    ) -> Self {
+        let over = Arc::new(AtomicBool::new(quiet));
+        let ends = Arc::clone(&over);
+        scope.spawn(move || match std::io::stderr().is_terminal() {
+            true => bar(&watch, count, &ends),
+            false => lines(&watch, count, &ends),
+        });
+        Self(over)
+    }
+}
+
+impl Drop for Runs {
+    fn drop(&mut self) {
+        self.0.store(true, Ordering::Relaxed);
+    }
+}
+
+fn bar(watch: &Watch, count: u64, over: &AtomicBool) {
+    let bar = ProgressBar::with_draw_target(Some(count), ProgressDrawTarget::stderr());
+    if let Ok(style) = ProgressStyle::with_template("{bar:30} {pos} of {len} runs, {eta} left") {
+        bar.set_style(style);
+    }
+    while !over.load(Ordering::Relaxed) {
+        bar.set_position(watch.done.load(Ordering::Relaxed));
+        std::thread::sleep(Duration::from_millis(100));
+    }
+    bar.finish_and_clear();
+}
+
+fn lines(watch: &Watch, count: u64, over: &AtomicBool) {
+    let (start, mut next) = (Instant::now(), LINE_EVERY);
+    while !over.load(Ordering::Relaxed) {
+        std::thread::sleep(Duration::from_millis(50));
+        let (spent, done) = (start.elapsed(), watch.done.load(Ordering::Relaxed));
+        if spent < next || done == 0 {
+            continue;
+        }
+        next = spent + LINE_EVERY;
+        let left = spent.as_secs_f64() * count.saturating_sub(done) as f64 / done as f64;
+        eprintln!("{done} of {count} runs, {left:.0} s left");
     }
 }

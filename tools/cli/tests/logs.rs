@@ -1,7 +1,4 @@
 //! Databases of healthy operation from CSV files: what is read, and what is refused in one sentence.
-//!
-//! promise: sound-logs
-//! promise: any-dialect
 #![allow(missing_docs)]
 
 mod common;
@@ -142,6 +139,8 @@ fn the_examples_logs_are_what_its_script_writes() {
 }
 
 /// The dialects in which spreadsheets, loggers and simulation tools write the same log.
+///
+/// promise: any-dialect
 #[test]
 fn a_log_is_read_in_every_dialect() {
     let (one, two) = (log(&rows(0, 200, 0)), log(&rows(1, 200, 0)));
@@ -223,6 +222,8 @@ fn a_log_is_read_in_every_dialect() {
 }
 
 /// Rounded times are no gaps, and a time column may be named.
+///
+/// promise: any-dialect
 #[test]
 fn rounded_times_and_named_columns_are_read() {
     let (one, two) = (rows(0, 200, 0), log(&rows(1, 200, 0)));
@@ -340,6 +341,7 @@ fn not_regular(bench: &Bench, arguments: &[&str], file: &str) {
 /// One damaged log: what is wrong, the first file, and words the sentence must have.
 type Case = (&'static str, String, &'static [&'static str]);
 
+/// promise: checked-logs
 #[test]
 fn damaged_logs_are_refused_in_one_sentence() {
     let good = rows(0, 200, 0);
@@ -602,6 +604,7 @@ fn damaged_logs_are_refused_in_one_sentence() {
     }
 }
 
+/// promise: checked-logs
 #[test]
 fn files_that_do_not_fit_the_modes() {
     let (one, two) = (log(&rows(0, 200, 0)), log(&rows(1, 200, 0)));

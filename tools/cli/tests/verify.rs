@@ -1,7 +1,4 @@
 //! `verify` proves what an FMU promises, and notices whatever does not belong to it.
-//!
-//! promise: carried-proof
-//! promise: signed
 #![allow(missing_docs)]
 
 mod common;
@@ -191,6 +188,7 @@ fn dwelling() -> String {
         .replace("decay = 0.7\noutput", "decay = 0.9\noutput")
 }
 
+/// promise: carried-proof
 #[test]
 fn both_fmus_are_proved_and_their_promises_printed() {
     let exported = Exported::new(SOUND);
@@ -221,6 +219,7 @@ fn both_fmus_are_proved_and_their_promises_printed() {
     assert_eq!(exported.verify().code(), 0, "packed again, it is the same");
 }
 
+/// promise: carried-proof
 #[test]
 fn a_dwell_time_is_proved_and_a_shorter_one_is_not() {
     let mut exported = Exported::new(&dwelling());
@@ -242,6 +241,7 @@ fn a_dwell_time_is_proved_and_a_shorter_one_is_not() {
     exported.refused("shorter dwell time", 1, &[]);
 }
 
+/// promise: carried-proof
 #[test]
 fn parts_that_do_not_belong_together() {
     let mut gain = Exported::new(SOUND);
@@ -282,6 +282,7 @@ fn parts_that_do_not_belong_together() {
     }
 }
 
+/// promise: carried-proof
 #[test]
 fn a_careful_forger_is_found_out() {
     let mut running = Exported::new(SOUND);
@@ -351,6 +352,7 @@ fn a_careful_forger_is_found_out() {
     gamma.refused("gamma lowered", 1, &["attenuation", "proved"]);
 }
 
+/// promise: carried-proof
 #[test]
 fn a_description_that_says_something_else() {
     let mut renamed = Exported::new(SOUND);
@@ -368,6 +370,7 @@ fn a_description_that_says_something_else() {
     renamed.refused("a name", 1, &[DESCRIPTION, &format!("line {line} on")]);
 }
 
+/// promise: carried-proof
 #[test]
 fn binaries_that_are_none() {
     let at = |platform: &str, name: &str| format!("binaries/{platform}/{name}.so");
@@ -409,6 +412,7 @@ fn first_number(value: &mut Value) -> Option<&mut Value> {
     }
 }
 
+/// promise: carried-proof
 #[test]
 fn what_is_missing_or_no_fmu_of_ours() {
     for name in [DESIGN, CERTIFICATE, DESCRIPTION] {
@@ -446,6 +450,7 @@ fn what_is_missing_or_no_fmu_of_ours() {
     );
 }
 
+/// promise: carried-proof
 #[test]
 fn a_damaged_archive_is_never_taken_for_another_design() {
     let exported = Exported::new(SOUND);
@@ -535,6 +540,8 @@ fn key_pair(bench: &Bench, name: &str) {
 
 /// A signed FMU is accepted by its key alone; what nothing else looks at cannot be changed either; every
 /// refusal says what is wrong.
+///
+/// promise: signed
 #[test]
 fn a_signature_tells_whose_fmu_it_is() {
     let bench = Bench::new(SOUND);
@@ -567,6 +574,8 @@ fn a_signature_tells_whose_fmu_it_is() {
 }
 
 /// A key that cannot be used is refused before anything is written.
+///
+/// promise: signed
 #[test]
 fn a_key_that_cannot_sign_is_refused() {
     let bench = Bench::new(SOUND);
@@ -580,7 +589,9 @@ fn a_key_that_cannot_sign_is_refused() {
 }
 
 /// A library that offers the functions of an FMU and does nothing is found out by running it, and so
-/// is one that crashes or hangs; the program lives on.
+/// is one that crashes or hangs; the program goes on.
+///
+/// promise: carried-proof
 #[test]
 fn a_binary_that_does_something_else_is_found_out() {
     let exported = Exported::new(SOUND);

@@ -502,15 +502,15 @@ fn bumpless_transfer_says_how_often() {
             "{text}"
         );
     }
-    let hasty = damaged(
+    let too_soon = damaged(
         "lyapunov = \"common\"\n",
         "lyapunov = \"dwell\"\nbumpless = true\n",
     );
-    let hasty = hasty.replace(
+    let too_soon = too_soon.replace(
         "{ from = 30, mode = 2 }]",
         "{ from = 2, mode = 2 }, { from = 50, mode = 1 }]",
     );
-    let bench = Bench::new(hasty);
+    let bench = Bench::new(too_soon);
     let warnings = of_design(&bench);
     let short = |warning: &&String| {
         warning.contains("a mode lasts 2 samples only") && warning.contains("controller.bumpless")

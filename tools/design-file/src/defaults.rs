@@ -20,11 +20,12 @@
 //! | `signals.*.nominal` | the largest value of this signal among the operating points; if that is 0, half of `max - min`; if there is none, 1, unless balancing the plant about the known values puts one of these signals beyond a factor of 1000 from 1: then what balancing gives |
 //! | `signals.*.min`, `max` | unbounded |
 //! | `disturbance` | no periodic disturbance is learned on line |
+//! | `disturbance.harmonics` | 1 |
 //! | `disturbance.amplitude` | unknown: learning starts from nothing |
 //! | `controller.output_weight`, `integral_weight`, `input_weight` | 1, 0.3 and 0.1 divided by the nominal value of the signal |
 //! | `controller.tracked` | the first outputs, as many as there are inputs |
 //! | `controller.latency`, `lyapunov`, `objective`, `decay` | 0, `common`, `attenuation`, 0.95 |
-//! | `controller.bumpless`, `feedforward` | false, true |
+//! | `controller.bumpless`, `feedforward`, `internal_model` | false, true, false |
 //! | `observer.kind` | `auto` |
 //! | `observer.decay` | that of the controller |
 //! | `estimator.method`, `database` | `observer` (`reference` where `database` names logs), `commission` |
@@ -36,6 +37,7 @@
 //! | `estimator.response_length` | until the response has decayed to 1e-7 of itself |
 //! | `estimator.threshold` | from `sigmas`, and at least a thousandth of the nominal value of the output |
 //! | `compensation.method` | `virtual-sensor` |
+//! | `scenario.steps`, `seed` | 1000, 1 |
 //! | `scenario.noise`, `fault` | none |
 //! | `scenario.schedule` | mode 1 all the time |
 //! | `scenario.reference` | a step after a tenth of the run, of 1 if the output has no nominal value, else of a fifth of it |

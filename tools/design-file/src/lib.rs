@@ -2,7 +2,7 @@
 //! one sentence that says what is wrong with which key.
 //!
 //! [`schema`] is what a file may hold, [`defaults`] what an absent key means, [`check`] what a value
-//! must satisfy.
+//! must satisfy. [`identification`] writes a design file from logs, [`examples`] are some to start from.
 //!
 //! ```
 //! use std::path::Path;
@@ -31,8 +31,10 @@ pub mod defaults;
 mod error;
 mod estimator;
 mod event;
+pub mod examples;
 mod experiment;
 mod healthy_log;
+pub mod identification;
 mod notes;
 mod plant;
 pub mod schema;

@@ -130,7 +130,7 @@ pub(crate) fn read(file: &DesignFile, folder: &Path, notes: &Notes) -> Result<Fo
         (None, false) => given_modes(file, folder)?,
     };
     let plant = assembled(file, &modes)?;
-    bearable(&plant, sized(&plant)?)?;
+    check_magnitudes(&plant, sized(&plant)?)?;
     if !is_continuous(file) && plant.looks_continuous() {
         notes.add(looks_continuous(""));
     }
@@ -168,7 +168,7 @@ fn named(model: &PlantModel, file: &DesignFile) -> Result<Found, String> {
         );
     }
     let plant = linearised(model, file.sample_time)?;
-    bearable(&plant, sized(&plant)?)?;
+    check_magnitudes(&plant, sized(&plant)?)?;
     Ok(Found {
         plant,
         held_inputs: 0,
@@ -225,7 +225,7 @@ fn extend(mut plant: SwitchedPlant, given: Vec<Given>, latency: i64) -> Result<F
         }
         *mode = mode.with_feedthrough(feedthrough);
     }
-    bearable(&plant, plant.dimensions())?;
+    check_magnitudes(&plant, plant.dimensions())?;
     Ok(Found {
         plant,
         held_inputs: inputs,
@@ -461,7 +461,7 @@ fn matrix(name: &str, given: &[Vec<f64>]) -> Result<DMatrix<f64>, String> {
     sound(name, matrix)
 }
 
-/// A matrix of finite numbers of bearable size.
+/// A matrix of finite numbers of allowed size.
 fn sound(name: &str, matrix: DMatrix<f64>) -> Result<DMatrix<f64>, String> {
     let unsound = |&value: &f64| check::number(value).is_err();
     match matrix.iter().position(unsound) {
@@ -476,7 +476,7 @@ fn sound(name: &str, matrix: DMatrix<f64>) -> Result<DMatrix<f64>, String> {
 }
 
 /// Refuses what no solver could finish.
-fn bearable(plant: &SwitchedPlant, dims: Dimensions) -> Result<(), String> {
+fn check_magnitudes(plant: &SwitchedPlant, dims: Dimensions) -> Result<(), String> {
     let sizes = [
         ("states (rows of A)", dims.states),
         ("inputs (columns of B)", dims.inputs),

@@ -1,6 +1,5 @@
 //! Why an FMU was not written, or not verified.
 
-use crate::output;
 use std::path::PathBuf;
 
 /// What went wrong. Each reads as one sentence that says what to do.

@@ -3,16 +3,17 @@
 use crate::Error;
 use crate::archive::{self, Contents};
 use crate::certificate::{self, Certificate};
-use crate::output::Staging;
 use crate::platform::{PLATFORMS, Platform};
 use crate::signature::SigningKey;
 use crate::ssp::{self, Component, System};
 use ftc_design::{Design, Proof};
 use model_description::xml::{self, Document};
 use model_description::{CONTROLLER, Interface, PLANT, VariableTable};
+use output::Staging;
 use report::Digest;
 use report::connection::{self, Side};
 use report::documentation;
+use std::fmt;
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::time::SystemTime;
@@ -118,6 +119,29 @@ pub struct Exported {
     pub coupling: &'static str,
     /// What does not fit in the package, if one was written.
     pub misfit: Option<String>,
+}
+
+/// The files, how the FMUs are stepped, and the platforms.
+impl fmt::Display for Exported {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        for path in &self.paths {
+            writeln!(f, "wrote {}", path.display())?;
+        }
+        writeln!(f, "coupling: {}", self.coupling)?;
+        let named = |packed: &Packed| match packed.native {
+            true => format!("{} (built for this machine)", packed.platform),
+            false => packed.platform.into(),
+        };
+        let platforms: Vec<String> = self.packed.iter().map(named).collect();
+        writeln!(f, "platforms: {}", platforms.join(", "))?;
+        for platform in &self.outdated {
+            writeln!(
+                f,
+                "left out {platform}: its binaries are older than this program's: run make fmu-all"
+            )?;
+        }
+        Ok(())
+    }
 }
 
 /// A platform for which an FMU holds a binary.

@@ -2,24 +2,25 @@
 //!
 //! [`export`] writes the controller FMU, the plant FMU and on request an SSP package that connects
 //! them; nothing is compiled and the same design gives the same bytes. [`verify`] proves the
-//! certificate of a written FMU again. [`output`] writes a set of files completely or not at all,
-//! [`Replacement`] a single one.
+//! certificate of a written FMU again; [`solved`] keeps a solved design in a file.
 //!
-//! ```no_run
+//! With the FMU binaries of `make build`:
+//!
+//! ```
 //! # fn main() -> Result<(), Box<dyn std::error::Error>> {
-//! let request = design_file::read("heater.toml".as_ref())?.request;
+//! let request = design_file::read("../../examples/paper.toml".as_ref())?.request;
 //! let design = ftc_design::assembly::assemble(request)?;
+//! let out = tempfile::tempdir()?;
 //! let options = package::Options {
-//!     out: "out".into(),
-//!     binaries: "target/release".into(),
+//!     out: out.path().into(),
+//!     binaries: "../../target/release".into(),
 //!     ssp: false,
 //!     platforms: None,
 //!     sign: None,
 //! };
-//! for path in package::export(&design, &options)?.paths {
-//!     println!("{}", path.display());
-//! }
-//! println!("{}", package::verify("out/heater_controller.fmu".as_ref())?);
+//! let paths = package::export(&design, &options)?.paths;
+//! assert!(paths[0].ends_with("paper_controller.fmu") && paths[1].ends_with("paper_plant.fmu"));
+//! println!("{}", package::verify(&paths[0])?);
 //! # Ok(())
 //! # }
 //! ```
@@ -30,17 +31,13 @@ pub mod certificate;
 mod description;
 mod error;
 mod export;
-pub mod output;
 pub mod platform;
 mod reading;
-mod replacement;
 pub mod signature;
+pub mod solved;
 mod ssp;
-mod unfinished;
 mod verify;
 
 pub use error::Error;
 pub use export::{Exported, Options, Packed, export};
-pub use replacement::Replacement;
-pub use unfinished::abandon;
 pub use verify::{Checks, Verification, verify, verify_with};

@@ -17,16 +17,6 @@ if TYPE_CHECKING:
 
     from distributed import Client
 
-# What the rows of the summary are, as in the command line's table.
-ROWS = {
-    "error": "true error with fault tolerance",
-    "error_told": "true error told the fault",
-    "error_without": "true error without",
-    "over_told": "with, over told",
-    "over_none": "with, over without",
-    "healthy_error": "true error with, no fault",
-    "healthy_over_none": "with, over without, no fault",
-}
 # Shards per thread of a cluster: enough that a slow or lost worker delays little.
 SHARDS_PER_THREAD = 4
 # How often a shard is given to another worker when its worker dies.
@@ -57,24 +47,15 @@ class Campaign:
 
     def save(self, out: str | PathLike[str]) -> list[Path]:
         """Writes campaign.json and campaign.html into a folder; returns their paths."""
-        out = Path(out)
-        out.mkdir(parents=True, exist_ok=True)
-        paths = [out / "campaign.json", out / "campaign.html"]
-        paths[0].write_text(_core.campaign_json(self._part, self._asked), encoding="utf-8")
-        paths[1].write_text(self._repr_html_(), encoding="utf-8")
-        return paths
+        return [Path(path) for path in self._design.core.campaign_save(self._part, self._asked, Path(out))]
 
     def __repr__(self) -> str:
         """Returns one line: the design and the runs."""
         return f"<ftc_fmu.Campaign of {self._design.name}: {count(self.runs, 'run')}>"
 
     def __str__(self) -> str:
-        """Returns the figures a person looks at first."""
-        lines = [f"{self._design.name}: {self.runs} random runs"]
-        for key, quantiles in self.report["summary"].items():
-            shown = ", ".join(f"{name} {value:.4g}" for name, value in quantiles.items() if value is not None)
-            lines.append(f"  {ROWS.get(key, key)}: {shown}")
-        return "\n".join(lines)
+        """Returns the figures a person looks at first, as the command line's table."""
+        return _core.campaign_text(self._part).rstrip("\n")
 
     def _repr_html_(self) -> str:
         """Shows the page with its distributions in a notebook."""

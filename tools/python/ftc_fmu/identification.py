@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -40,21 +40,11 @@ class Identification:
     held_out: list[int]
     coordinates: str
     switch_fit: float | None
+    _text: str = field(repr=False)
 
     def __str__(self) -> str:
         """Returns the orders tried, the one chosen, and the fit per mode."""
-        lines = ["order  fit on validation data"]
-        for order, fit in self.tried.items():
-            lines.append(f"{order:5}  {fit:6.2f} %{'  <- chosen' if order == self.order else ''}")
-        names = [entry["name"] for entry in self.plant.signals["outputs"]]
-        for mode, fits, samples in zip(self.plant.modes, self.fit, self.held_out, strict=True):
-            each = ", ".join(f"{name} {fit:.2f} %" for name, fit in zip(names, fits, strict=True))
-            lines.append(f"{mode.name}: fit on {samples} samples held out: {each}")
-        if self.switch_fit is not None:
-            lines.append(f"the modes share one state; at switches it is continuous to {self.switch_fit:.1f} %")
-        elif self.coordinates == "outputs":
-            lines.append("too few switches were logged to tell one mode's state from another's: states are outputs")
-        return "\n".join(lines)
+        return self._text
 
 
 def identify(
@@ -93,9 +83,9 @@ def identify(
         mode = log.mode if log.mode is not None else np.full(len(log), number if unsaid else 1)
         data.append((log.u.tolist(), log.y.tolist(), [int(value) for value in mode]))
     known = dict(disturbance or {})
-    harmonics = range(1, int(known.get("harmonics", 1)) + 1) if known else ()
-    periods = [float(known["period"]) / (first.sample_time * harmonic) for harmonic in harmonics]
-    chosen, tried, modes, coordinates, switch_fit = _core.identify(data, order, periods)
+    period = (float(known["period"]), int(known.get("harmonics", 1)), first.sample_time) if known else None
+    names = [str(name) for name in first.outputs]
+    chosen, tried, modes, coordinates, switch_fit, text = _core.identify(data, order, period, names)
     points = [dict(zip("xuy", point, strict=True)) for _, _, _, point, _, _, _ in modes]
     plant = Plant(
         [(A, B, C) for A, B, C, *_ in modes],
@@ -112,4 +102,5 @@ def identify(
         held_out=[mode[5] for mode in modes],
         coordinates=coordinates,
         switch_fit=switch_fit,
+        _text=text.rstrip("\n"),
     )

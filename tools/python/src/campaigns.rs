@@ -1,12 +1,12 @@
 //! Campaigns in parts that merge exactly.
 
-use crate::design::Made;
 use crate::errors;
 use crate::waiting::wait;
 use campaign::{Options, Partial, Watch};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use pyo3::types::PyBytes;
+use report::Made;
 use std::ops::Range;
 use std::sync::Arc;
 use std::sync::atomic::Ordering;
@@ -104,4 +104,10 @@ pub fn campaign_json(part: &[u8], asked: u64) -> PyResult<String> {
         &read(part)?,
         asked,
     )))
+}
+
+/// The table of a campaign.
+#[pyfunction]
+pub fn campaign_text(part: &[u8]) -> PyResult<String> {
+    Ok(campaign::page::text(&read(part)?))
 }

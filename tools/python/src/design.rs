@@ -7,23 +7,15 @@ use crate::run::Run;
 use crate::waiting::wait;
 use ftc_design::DesignError;
 use ftc_design::assembly::assemble;
-use ftc_design::warnings::LoggedMovement;
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use pyo3::types::PyBytes;
-use report::{summary, warnings};
+use report::{Made, Source, summary};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 /// The most threads of one design.
 const MOST_THREADS: usize = 1024;
-
-/// A design and what its user should know of it.
-pub struct Made {
-    /// The design.
-    pub design: ftc_design::Design,
-    warnings: Vec<String>,
-}
 
 /// A finished design.
 #[pyclass(frozen, module = "ftc_fmu._core")]
@@ -54,14 +46,12 @@ pub fn solve(
         design_file::parse(text, &folder).map_err(|error| errors::of_input(py, error, author))?;
     let what = || "solving for gains and certifying them".to_string();
     let made = wait(py, &what, listener.as_ref(), move || {
-        let logged = LoggedMovement::of(&loaded.request.estimator.database);
+        let (request, source) = Source::split(loaded);
         let design = match pool {
-            Some(pool) => pool.install(|| assemble(loaded.request))?,
-            None => assemble(loaded.request)?,
+            Some(pool) => pool.install(|| assemble(request))?,
+            None => assemble(request)?,
         };
-        let mut warnings = loaded.notes;
-        warnings.extend(warnings::of_design(&loaded.file, logged.as_ref(), &design));
-        Ok::<_, DesignError>(Made { design, warnings })
+        Ok::<_, DesignError>(source.made(design))
     })?;
     made.map(|made| Design(Arc::new(made)))
         .map_err(|error| errors::of_design(py, &error, text, author))
@@ -89,7 +79,7 @@ fn pool(py: Python<'_>, threads: usize) -> PyResult<rayon::ThreadPool> {
 pub fn restore(record: &[u8]) -> PyResult<Design> {
     let (design, warnings) = serde_json::from_slice(record)
         .map_err(|error| PyValueError::new_err(format!("no record of a design: {error}")))?;
-    Ok(Design(Arc::new(Made { design, warnings })))
+    Ok(Design(Arc::new(Made::again(design, warnings))))
 }
 
 #[pymethods]
@@ -193,6 +183,19 @@ impl Design {
         let watched = (threads, listener.as_ref());
         let part = campaigns::run(py, self.0.clone(), options, first..last, watched)?;
         Ok(PyBytes::new(py, &part))
+    }
+
+    /// Writes `campaign.json` and `campaign.html`; returns their paths.
+    fn campaign_save(
+        &self,
+        py: Python<'_>,
+        part: &[u8],
+        asked: u64,
+        out: PathBuf,
+    ) -> PyResult<[PathBuf; 2]> {
+        let part = campaigns::read(part)?;
+        campaign::files::write(&out, &self.0.design, &part, asked)
+            .map_err(|error| errors::of_package(py, error.into()))
     }
 
     /// The page of a campaign.

@@ -63,23 +63,25 @@ pub fn time_column(
 
 /// Matrices A, B, C, then x0, u0, y0, then the fit per output, samples held out and used.
 type Found = (Rows, Rows, Rows, [Vec<f64>; 3], Vec<f64>, usize, usize);
-/// Order, orders tried with their fits, modes, how states were joined and the fit of that.
+/// Order, orders tried with their fits, modes, how states were joined and the fit of that, and the text.
 type Answer = (
     usize,
     Vec<(usize, f64)>,
     Vec<Found>,
     &'static str,
     Option<f64>,
+    String,
 );
 
 /// Models of the modes from logs: per log inputs, outputs (rows of samples) and modes (from 1);
-/// `periods` in samples.
+/// `disturbance` as its period (s), its harmonics and the sample time (s); `names` of the outputs.
 #[pyfunction]
 pub fn identify(
     py: Python<'_>,
     logs: Vec<(Rows, Rows, Vec<usize>)>,
     order: Option<usize>,
-    periods: Vec<f64>,
+    disturbance: Option<(f64, u32, f64)>,
+    names: Vec<String>,
 ) -> PyResult<Answer> {
     let logs: Vec<Log> = logs
         .into_iter()
@@ -94,16 +96,19 @@ pub fn identify(
         .collect::<PyResult<_>>()?;
     let mut settings = Settings::default();
     settings.order = order;
-    settings.periods = periods;
+    if let Some((period, harmonics, sample_time)) = disturbance {
+        settings = settings.with_disturbance(period, harmonics, sample_time);
+    }
     let found = wait(py, &|| "identifying".into(), None, move || {
         ftc_identify::identify(&logs, &settings)
     })?;
     found
-        .map(answer)
+        .map(|found| answer(found, &names))
         .map_err(|error| errors::of_sentence(py, error))
 }
 
-fn answer(found: Identified) -> Answer {
+fn answer(found: Identified, names: &[String]) -> Answer {
+    let text = report::identification::text(&found, names);
     let (joined, fit) = match found.coordinates {
         Coordinates::Single => ("single mode", None),
         Coordinates::Switches { fit } => ("switches", Some(fit)),
@@ -122,5 +127,5 @@ fn answer(found: Identified) -> Answer {
         )
     };
     let modes = found.modes.into_iter().map(one).collect();
-    (found.order, found.tried, modes, joined, fit)
+    (found.order, found.tried, modes, joined, fit, text)
 }

@@ -20,7 +20,7 @@ use std::path::{Path, PathBuf};
 #[pymodule]
 mod _core {
     #[pymodule_export]
-    use super::campaigns::{campaign_json, campaign_merge, campaign_missing};
+    use super::campaigns::{campaign_json, campaign_merge, campaign_missing, campaign_text};
     #[pymodule_export]
     use super::controller::Controller;
     #[pymodule_export]
@@ -79,13 +79,13 @@ fn platforms(binaries: PathBuf) -> Vec<&'static str> {
 /// Names of the examples.
 #[pyfunction]
 fn examples() -> Vec<&'static str> {
-    ftc_fmu::examples::names()
+    design_file::examples::names()
 }
 
 /// Name and contents of an example's files, the one to start from first.
 #[pyfunction]
 fn example(py: Python<'_>, name: &str) -> PyResult<Vec<(String, Py<PyBytes>)>> {
-    let files = ftc_fmu::examples::files(name).map_err(|what| errors::of_sentence(py, what))?;
+    let files = design_file::examples::files(name).map_err(|what| errors::of_sentence(py, what))?;
     let bytes = |(name, bytes): (String, Vec<u8>)| (name, PyBytes::new(py, &bytes).unbind());
     Ok(files.into_iter().map(bytes).collect())
 }

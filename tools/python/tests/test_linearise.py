@@ -203,11 +203,11 @@ def test_wrong_directional_derivatives_are_found_out(version: int, tmp_path: Pat
     forgetful = made(tmp_path, "oscillator", version, text, ["-DDERIVATIVES", "-DFORGETFUL"])
     with pytest.warns(UserWarning, match='directional derivatives of the output "y" are not those'):
         found = ftc.Plant.from_fmu(forgetful, ["u"], ["y"], sample_time=0.1).modes[0]
-    (tmp_path / "sound").mkdir()
-    oscillator = made(tmp_path / "sound", "oscillator", version, text, ["-DDERIVATIVES"])
-    sound = ftc.Plant.from_fmu(oscillator, ["u"], ["y"], sample_time=0.1).modes[0]
+    (tmp_path / "intact").mkdir()
+    oscillator = made(tmp_path / "intact", "oscillator", version, text, ["-DDERIVATIVES"])
+    intact = ftc.Plant.from_fmu(oscillator, ["u"], ["y"], sample_time=0.1).modes[0]
     for name in "ABC":
-        np.testing.assert_allclose(getattr(found, name), getattr(sound, name), atol=1e-8)
+        np.testing.assert_allclose(getattr(found, name), getattr(intact, name), atol=1e-8)
 
 
 def test_one_name_and_one_point_need_no_list(oscillator: Path) -> None:

@@ -46,8 +46,8 @@ pub fn cases(design: &Design) -> Vec<Case> {
     departures(design)
         .into_iter()
         .map(|(name, deviation)| {
-            let truth = design.true_plant.clone().with_deviation(deviation);
-            let errors = |variant| errors(design, &controller, truth.clone(), variant);
+            let true_plant = design.true_plant.clone().with_deviation(deviation);
+            let errors = |variant| errors(design, &controller, true_plant.clone(), variant);
             Case {
                 name,
                 with: errors(Variant::Ftc),
@@ -120,11 +120,11 @@ fn height(design: &Design, channel: usize) -> f64 {
 fn errors(
     design: &Design,
     controller: &Controller,
-    truth: TruePlant,
+    true_plant: TruePlant,
     variant: Variant,
 ) -> Vec<f64> {
     let plant =
-        PlantSimulator::with_true_plant(design.plant.clone(), truth, design.scenario.clone());
+        PlantSimulator::with_true_plant(design.plant.clone(), true_plant, design.scenario.clone());
     let tracked = &design.controller.feedback.tracked;
     let mut squares = vec![0.0; tracked.len()];
     let stalled = visit(&plant, controller, variant, |seen| {

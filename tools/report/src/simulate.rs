@@ -13,6 +13,7 @@ use ftc_simulate::{PlantSimulator, Variant, run};
 use serde_json::{Map, Value, json};
 use std::fmt::Write as _;
 use std::io::{self, Write};
+use std::path::Path;
 
 /// Everything that `simulate` writes beside the samples, and what it says.
 #[non_exhaustive]
@@ -106,6 +107,58 @@ pub enum SimulateError {
     /// The samples could not be taken where they went.
     #[error("the samples cannot be written ({0})")]
     Samples(#[from] io::Error),
+    /// The directory that gets the files.
+    #[error(transparent)]
+    Output(#[from] output::Error),
+}
+
+/// As [`simulate`], with the samples in [`TABLE`] and all files in a directory, or none; `told` hears how
+/// many samples are done, one after the other.
+///
+/// # Errors
+/// As [`simulate`], or a directory that cannot be written to.
+pub fn simulate_into(
+    out: &Path,
+    design: &Design,
+    warnings: Vec<String>,
+    baselines: bool,
+    told: &dyn Fn(u64),
+) -> Result<Simulation, SimulateError> {
+    let staging = output::Staging::new(out)?;
+    let mut outcome = None;
+    staging.add_written(TABLE, |file| {
+        let table = TableOfSamples::new(file, design.plant.sample_time);
+        let mut samples = Counted {
+            table,
+            told,
+            done: 0,
+        };
+        let found = simulate(design, warnings, baselines, &mut samples);
+        if let Err(SimulateError::Samples(error)) = found {
+            return Err(error);
+        }
+        outcome = Some(found);
+        samples.table.finish()
+    })?;
+    let found = outcome.unwrap_or_else(|| Err(io::Error::other("none was made").into()))?;
+    staging.add_all(&found.files)?;
+    staging.commit()?;
+    Ok(found)
+}
+
+/// The table of samples, and how many it holds.
+struct Counted<'a, W: Write> {
+    table: TableOfSamples<W>,
+    told: &'a dyn Fn(u64),
+    done: u64,
+}
+
+impl<W: Write> Samples for Counted<'_, W> {
+    fn take(&mut self, runs: &[(Variant, Record)]) -> io::Result<()> {
+        self.done += 1;
+        (self.told)(self.done);
+        self.table.take(runs)
+    }
 }
 
 /// Runs the scenario in every variant, and with every baseline if asked for:
@@ -354,8 +407,8 @@ fn metrics(runs: &[Digest], bound: Option<&[f64]>, warnings: &[String]) -> Strin
         let merits = run.merits();
         let list = |pick: fn(&Merits) -> f64| merits.iter().map(pick).collect::<Vec<f64>>();
         let mut value = json!({
-            "mse": { "measured": list(|m| m.measured.mse), "true": list(|m| m.truth.mse) },
-            "vaf": { "measured": list(|m| m.measured.vaf), "true": list(|m| m.truth.vaf) },
+            "mse": { "measured": list(|m| m.measured.mse), "true": list(|m| m.true_output.mse) },
+            "vaf": { "measured": list(|m| m.measured.vaf), "true": list(|m| m.true_output.vaf) },
         });
         if let Some(wrong) = run.wrong_modes() {
             value["wrong_mode"] = json!({ "samples": wrong.samples, "longest": wrong.longest });
@@ -404,9 +457,9 @@ fn summary(design: &Design, runs: &[Digest], bound: Option<&[f64]>) -> String {
                 run.variant.key(),
                 design.signals.outputs[output].name,
                 merits.measured.mse,
-                merits.truth.mse,
+                merits.true_output.mse,
                 vaf(merits.measured.vaf),
-                vaf(merits.truth.vaf),
+                vaf(merits.true_output.vaf),
             );
         }
     }

@@ -262,13 +262,13 @@ fn a_lost_sensor_leaves_a_gap_in_its_curve() {
 
 #[test]
 fn a_curve_that_runs_away_does_not_flatten_the_others() {
-    let calm: Vec<_> = (0..100)
+    let smooth: Vec<_> = (0..100)
         .map(|k| [k as f64, (k as f64 / 10.0).sin()])
         .collect();
     let wild: Vec<_> = (0..100).map(|k| [k as f64, 1.5f64.powi(k * 10)]).collect();
     let figure = Figure::new("f", "t", "x", "y")
         .with(Series::new("wild", wild).secondary())
-        .with(Series::new("calm", calm));
+        .with(Series::new("smooth", smooth));
     let document = svg::document(&figure);
     check_svg(&document);
     assert!(document.contains("wild leaves the picture"));

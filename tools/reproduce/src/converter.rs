@@ -140,7 +140,7 @@ impl Trial {
     /// Their true VAF.
     fn vaf(&self, variant: Variant) -> Vec<f64> {
         let judged = self.judged(variant).iter();
-        judged.map(|merit| merit.truth.vaf).collect()
+        judged.map(|merit| merit.true_output.vaf).collect()
     }
 }
 

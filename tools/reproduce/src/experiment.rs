@@ -29,7 +29,7 @@ pub struct OutputMerits {
     pub output: String,
     /// Against what the plant does.
     #[serde(rename = "true")]
-    pub truth: Merit,
+    pub true_output: Merit,
     /// Against what the sensor says.
     pub measured: Merit,
 }
@@ -42,7 +42,7 @@ pub fn merits(run: &Trajectory, design: &Design) -> Vec<OutputMerits> {
     named
         .map(|(&output, merits)| OutputMerits {
             output: design.signals.outputs[output].name.clone(),
-            truth: merits.truth,
+            true_output: merits.true_output,
             measured: merits.measured,
         })
         .collect()
@@ -50,7 +50,7 @@ pub fn merits(run: &Trajectory, design: &Design) -> Vec<OutputMerits> {
 
 /// Sum of the true mean square errors.
 pub fn true_error(merits: &[OutputMerits]) -> f64 {
-    merits.iter().map(|merit| merit.truth.mse).sum()
+    merits.iter().map(|merit| merit.true_output.mse).sum()
 }
 
 /// One row per output of every run: the names that `names` gives, then the figures of merit.
@@ -69,11 +69,12 @@ pub fn table<'a>(
     for (names, outputs) in runs {
         for OutputMerits {
             output,
-            truth,
+            true_output,
             measured,
         } in outputs
         {
-            let numbers = [truth.mse, truth.vaf, measured.mse, measured.vaf].map(number);
+            let numbers =
+                [true_output.mse, true_output.vaf, measured.mse, measured.vaf].map(number);
             let row = names.iter().chain([output]).chain(&numbers);
             table.row(row)?;
         }

@@ -2,6 +2,18 @@
 //!
 //! Both begin with a design file of examples/, so that what a page shows can be changed and run
 //! again by whoever reads it. Every number on a page is computed in the run.
+//!
+//! ```
+//! # fn main() -> Result<(), Box<dyn std::error::Error>> {
+//! use reproduce::{Experiment, run};
+//!
+//! let found = run(Experiment::Paper, &|step| println!("{step}"))?;
+//! println!("{}", found.summary);
+//! let names: Vec<&str> = found.files.iter().map(|(name, _)| name.as_str()).collect();
+//! assert!(names.contains(&"paper.html") && names.contains(&"paper.csv"));
+//! # Ok(())
+//! # }
+//! ```
 
 mod converter;
 mod experiment;

@@ -40,7 +40,7 @@ const REFERENCES: [&str; 4] = ["constant", "square", "sine", "levels"];
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 enum ControllerKind {
-    /// The sound design: gains of T2, reference estimator, virtual sensor.
+    /// The corrected design: gains of T2, reference estimator, virtual sensor.
     Proposed,
     /// The same, told the fault.
     ToldTheFault,
@@ -78,7 +78,7 @@ impl ControllerKind {
     fn explanation(self) -> &'static str {
         match self {
             Self::Proposed => {
-                "gains of the sound Theorem 2 (attenuation), fault estimated with the reference window, \
+                "gains of the corrected Theorem 2 (attenuation), fault estimated with the reference window, \
                  virtual sensor"
             }
             Self::ToldTheFault => {
@@ -88,7 +88,7 @@ impl ControllerKind {
                 "the same gains and estimates, compensated by the additive control (37)-(40)"
             }
             Self::AdditiveReference => {
-                "section III: gains of the sound Theorem 1 (decay, no attenuation), additive control, \
+                "section III: gains of the corrected Theorem 1 (decay, no attenuation), additive control, \
                  but the reference window as estimator"
             }
             Self::AdditiveSliding => "the same with the sliding window (44) as printed",

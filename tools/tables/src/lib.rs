@@ -3,6 +3,23 @@
 //!
 //! Only regular files of bounded size are read. Every [`Error`] reads as the end of a sentence that
 //! begins with the file's name.
+//!
+//! ```
+//! # fn main() -> Result<(), Box<dyn std::error::Error>> {
+//! use ftc_tables::{Clock, Table, find_time_column};
+//!
+//! let mut table = Table::open("../../examples/logged_open.csv".as_ref())?;
+//! let time = find_time_column(table.names(), None, &[])?.ok_or("no column is called t")?;
+//! let (mut clock, mut level) = (Clock::new(time), Vec::new());
+//! while let Some(row) = table.next_row()? {
+//!     clock.read(&mut table, &row)?;
+//!     level.push(table.number(&row, 3, f64::is_finite)?);
+//! }
+//! clock.check_uniform(5.0)?;
+//! assert_eq!(level[..2], [36.082, 34.674]);
+//! # Ok(())
+//! # }
+//! ```
 
 mod error;
 pub mod matrices;

@@ -181,7 +181,7 @@ impl Table {
         })
     }
 
-    /// The number in a cell (0-based column), if it is one that is `sound`.
+    /// The number in a cell (0-based column), if it is one that is `valid`.
     ///
     /// # Errors
     /// A cell without such a number, or with another decimal mark than earlier ones.
@@ -189,11 +189,11 @@ impl Table {
         &mut self,
         row: &Row,
         column: usize,
-        sound: impl Fn(f64) -> bool,
+        valid: impl Fn(f64) -> bool,
     ) -> Result<f64, Error> {
         let text = row.text(column);
         self.agree_on_mark(row.place, text)?;
-        match self.parse(text).filter(|value| sound(*value)) {
+        match self.parse(text).filter(|value| valid(*value)) {
             Some(value) => Ok(value),
             None => Err(self.no_number(row, column)),
         }

@@ -1,6 +1,6 @@
 //! What the importer is told, and when it is left in peace.
 //!
-//! promise: heard-errors
+//! promise: error-messages
 
 use crate::host::*;
 use fmu_abi::types::*;

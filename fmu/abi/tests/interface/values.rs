@@ -1,6 +1,6 @@
 //! Getting and setting: types, ranges, pointers, and what a bad call leaves behind.
 //!
-//! promise: untold-mode
+//! promise: missing-mode
 
 use crate::host::*;
 use fmu_abi::types::Status;

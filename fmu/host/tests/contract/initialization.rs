@@ -1,6 +1,6 @@
 //! Masters initialize one FMU after the other: an input may not be ready when its turn comes.
 //!
-//! promise: untold-mode
+//! promise: missing-mode
 
 use fmu_host::model::example;
 use fmu_host::types::Status;

@@ -220,7 +220,7 @@ mod tests {
         assert!(adapted.abs() <= fixed.abs() + 1e-12);
     }
 
-    /// A fault that grows slowly enough to stay unseen was once followed to any size.
+    /// A fault that grows slowly enough to stay undetected was once followed to any size.
     #[test]
     fn a_fault_that_grows_unseen_is_not_followed() {
         let known = predictor(&[1.0, 0.5], 10.0);

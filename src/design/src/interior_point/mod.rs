@@ -425,10 +425,10 @@ impl Stage<'_> {
             .zip(&slacks)
             .map(|(s, d)| s.scaled_slack(d))
             .collect();
-        let sound = scaled_slacks
+        let finite = scaled_slacks
             .iter()
             .all(|slack| slack.iter().all(|value| value.is_finite()));
-        sound.then(|| Direction {
+        finite.then(|| Direction {
             scaled_multipliers: targets
                 .iter()
                 .zip(&scaled_slacks)

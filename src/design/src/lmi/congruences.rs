@@ -1,15 +1,32 @@
 //! The margin problem for the interior-point method that uses its structure.
 
 use super::expression::{Affine, Variable};
-use super::problem::{Inequality, Margin, Problem};
+use super::inequality::Inequality;
+use super::problem::{Margin, Problem};
 use crate::interior_point::Problem as Structured;
 use crate::interior_point::{Block, Congruence, Product, Settings, maximise};
+use crate::verdict::SolverFailure;
 use nalgebra::DMatrix;
+
+impl Problem {
+    /// Maximises `t` subject to every inequality `>= t I` and the equations. With the unknowns
+    /// normalised (see [`Problem::require_trace`]) this problem always has a strictly feasible point,
+    /// and a negative or vanishing optimum means that the inequalities conflict.
+    ///
+    /// Solved by the interior-point method that uses the structure where there is one, else by the
+    /// general solver.
+    ///
+    /// # Errors
+    /// When the solver returns nothing that could be a solution.
+    pub fn margin(&self) -> Result<Margin, SolverFailure> {
+        margin(self).map_or_else(|| self.margin_by_general_solver(), Ok)
+    }
+}
 
 /// The margin, if every inequality is a sum of congruences of symmetric unknowns of one size and of at
 /// most one product with an unknown without structure, the traces of the symmetric ones being
 /// given, and if the method converges.
-pub(super) fn margin(problem: &Problem) -> Option<Margin> {
+fn margin(problem: &Problem) -> Option<Margin> {
     let translation = Translation::of(problem)?;
     let solution = maximise(&translation.problem, SETTINGS, &mut |_| ())?;
     if !solution.converged {

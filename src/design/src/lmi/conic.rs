@@ -1,7 +1,7 @@
 //! The solver's form: minimise `q'x` subject to `b - A x` in a product of cones.
 
 use super::expression::Affine;
-use super::problem::Inequality;
+use super::inequality::Inequality;
 use crate::verdict::SolverFailure;
 use clarabel::algebra::CscMatrix;
 use clarabel::solver::{

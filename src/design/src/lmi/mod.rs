@@ -9,7 +9,9 @@
 mod congruences;
 mod conic;
 mod expression;
+mod inequality;
 mod problem;
 
 pub use expression::{Affine, Variable};
-pub use problem::{Candidate, Inequality, Margin, Problem, trace};
+pub use inequality::Inequality;
+pub use problem::{Candidate, Margin, Problem, trace};

@@ -4,7 +4,7 @@
 //! `lambda^2 R0 + F F'`, all in per-unit and per unit of the disturbance. `lambda`, the ratio of the
 //! two noises, is what a design chooses: a small one trusts the sensors, a large one the model.
 
-use super::PerUnit;
+use super::existence::PerUnit;
 use crate::augmented::scaled;
 use crate::riccati;
 use ftc_plant::Mode;

@@ -8,7 +8,7 @@
 //! [`Observer::minimum_dwell`]: ftc_control::parameters::Observer::minimum_dwell
 
 use super::ObserverDesign;
-use super::proof::error_dynamics;
+use super::dynamics::{corrected_error, error_dynamics};
 use crate::blocks::BlockKind;
 use crate::certificate::{
     CertificateError, Enclosure, LyapunovMatrix, growth_block, prove, require, scaled_plant,
@@ -91,20 +91,6 @@ impl Family {
             errors,
         }
     }
-}
-
-/// `A_i - A_i H C_i` of a filter in correction form, in the observer's units, enclosed.
-pub(crate) fn corrected_error(
-    plant: &SwitchedPlant,
-    design: &ObserverDesign,
-    mode: usize,
-    gain: &Matrix,
-) -> Enclosure {
-    let (states, outputs) = (&design.certificate.states, &design.certificate.outputs);
-    let a = scaled_plant(&plant.modes[mode].a, states, states);
-    let c = scaled_plant(&plant.modes[mode].c, outputs, states);
-    let h = scaled_plant(&dense(gain), states, outputs);
-    &a - &(&(&a * &h) * &c)
 }
 
 /// Proves the error stable with every set that is served, and the dwell time between changes.

@@ -5,9 +5,10 @@
 //! `N` span what the kept sensors do not see. Only `P` is unknown. The gains are then Kalman
 //! filters, each moved towards the projection in `P` by as little as lets the function shrink.
 
+use super::ObserverDesign;
+use super::existence::PerUnit;
 use super::kalman::Filtered;
 use super::lost::{self, LostCertificate, changes, due_dwell, sets};
-use super::{ObserverDesign, PerUnit};
 use crate::augmented::scaled;
 use crate::blocks::{BlockKind, BlockName};
 use crate::certificate::{Enclosure, LyapunovMatrix, largest_ratio};
@@ -50,7 +51,7 @@ pub(super) fn common_function(demands: &[Demand], decay: f64) -> Option<DMatrix<
     for wanted in demands {
         let (a, basis) = match wanted {
             Demand::Fixed(error) => (error, DMatrix::identity(n, n)),
-            Demand::Free(filter, lost) => (&filter.a, unseen(&filter.kept(lost).0)),
+            Demand::Free(filter, lost) => (&filter.a, unmeasured(&filter.kept(lost).0)),
         };
         if basis.ncols() == 0 {
             continue;
@@ -67,7 +68,7 @@ pub(super) fn common_function(demands: &[Demand], decay: f64) -> Option<DMatrix<
 }
 
 /// An orthonormal basis of what the rows of `c` do not see.
-fn unseen(c: &DMatrix<f64>) -> DMatrix<f64> {
+fn unmeasured(c: &DMatrix<f64>) -> DMatrix<f64> {
     let n = c.ncols();
     if c.nrows() == 0 || c.amax() == 0.0 {
         return DMatrix::identity(n, n);

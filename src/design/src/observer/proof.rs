@@ -1,49 +1,32 @@
 //! What an observer claims, proved from the shipped doubles: the decay of its error and the dwell time.
 
 use super::ObserverDesign;
-use super::lost::{self, corrected_error};
+use super::dynamics::error_dynamics;
+use super::lost;
 use crate::Lyapunov;
 use crate::blocks::BlockKind;
 #[cfg(feature = "solver")]
 use crate::certificate::largest_ratio;
-use crate::certificate::{
-    CertificateError, Enclosure, check_dwell, growth_block, prove, require, scaled_plant,
-};
+use crate::certificate::{CertificateError, Enclosure, check_dwell, growth_block, prove, require};
 use crate::lyapunov::all_pairs;
-use crate::matrices::dense;
 use crate::units::is_unit;
 use ftc_control::Matrix;
 use ftc_control::parameters::ObserverKind;
 use ftc_plant::{Dimensions, SwitchedPlant};
 use nalgebra::DMatrix;
 
-/// The error dynamics `T_ij A_i - K_i C_i` of an observer in its certificate's units, enclosed; of a
-/// Kalman filter the error of the prediction, `A_i - A_i H_i C_i`, whatever mode follows.
-pub(crate) fn error_dynamics(
-    plant: &SwitchedPlant,
-    design: &ObserverDesign,
-    i: usize,
-    j: usize,
-) -> Enclosure {
-    if design.observer.kind == ObserverKind::Kalman {
-        return corrected_error(plant, design, i, &design.observer.decoupling[i][i]);
+impl ObserverDesign {
+    /// Proves, from these very doubles, the decay of the estimation error on this plant.
+    ///
+    /// # Errors
+    /// The first inequality that cannot be proved, or what does not fit.
+    pub fn verify(&self, plant: &SwitchedPlant) -> Result<(), CertificateError> {
+        verify(plant, self)
     }
-    let (states, outputs) = (&design.certificate.states, &design.certificate.outputs);
-    let matrix = scaled_plant;
-    let (own, next) = (&plant.modes[i], &plant.modes[j]);
-    let a = matrix(&own.a, states, states);
-    let gain = matrix(&dense(&design.observer.gains[i]), states, outputs);
-    let decoupling = matrix(&dense(&design.observer.decoupling[i][j]), states, outputs);
-    let seen = &matrix(&next.c, outputs, states) * &a;
-    let injected = &gain * &matrix(&own.c, outputs, states);
-    &(&a - &(&decoupling * &seen)) - &injected
 }
 
 /// Proves everything an observer claims: the decay of its error and the dwell time.
-pub(super) fn verify(
-    plant: &SwitchedPlant,
-    design: &ObserverDesign,
-) -> Result<(), CertificateError> {
+fn verify(plant: &SwitchedPlant, design: &ObserverDesign) -> Result<(), CertificateError> {
     check_observer_sizes(plant, design)?;
     let (spec, modes) = (&design.spec, plant.modes.len());
     let matrices: Vec<Enclosure> = design

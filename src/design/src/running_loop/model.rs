@@ -230,7 +230,7 @@ impl<'a> Models<'a> {
         let performance = &(h + &(d * &parts.gain));
         let rows: Vec<Enclosure> = tracked.iter().map(|&row| parts.c.rows(row, 1)).collect();
         let seen = Enclosure::blocks(&rows.iter().map(|row| vec![row]).collect::<Vec<_>>());
-        let unseen = Enclosure::zeros(tracked.len(), size);
+        let zeros = Enclosure::zeros(tracked.len(), size);
         let idle = Enclosure::zeros(n, b.shape().1);
         Loop {
             input: Enclosure::blocks(&[vec![b], vec![&idle]]),
@@ -238,7 +238,7 @@ impl<'a> Models<'a> {
             disturbance: &disturbed + &(&sensors * &parts.f),
             performance: Enclosure::blocks(&[vec![performance, &(d * &command_error)]]),
             direct: &(d * &error.correction) * &parts.f,
-            tracked: Enclosure::blocks(&[vec![&seen, &unseen]]),
+            tracked: Enclosure::blocks(&[vec![&seen, &zeros]]),
             command: (
                 Enclosure::blocks(&[vec![&parts.gain, &command_error]]),
                 error.correction,

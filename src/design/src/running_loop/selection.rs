@@ -5,7 +5,9 @@
 //! disturbance stays within [`TOLERANCE`] of that of a measured state; else the one of the least gain.
 
 use super::gain::Channel;
-use super::{Models, RunningLoop, TOLERANCE, command_deviation};
+use super::model::Models;
+use super::subject::command_deviation;
+use super::{RunningLoop, TOLERANCE};
 use crate::observer::{self, Candidate};
 use crate::verdict::DesignError;
 use crate::{ObserverChoice, ObserverDesign, ObserverSpec, SolverFailure, StateFeedback, parallel};

@@ -2,7 +2,8 @@
 
 use super::gain::Channel;
 use super::model::Loop;
-use super::{Claim, Scaled, Subject, SwitchingGain, prove_switching};
+use super::subject::{Claim, Scaled, Subject};
+use super::switching_proof::{SwitchingGain, prove_switching};
 use crate::Lyapunov;
 use crate::blocks::{BlockKind, BlockName};
 use crate::certificate::FactoredLyapunov;
@@ -15,7 +16,7 @@ use nalgebra::DMatrix;
 /// claimed.
 const MOST_UNKNOWNS: usize = 400;
 
-/// What the storage function must lose beside the signal, in coordinates in which it is near one.
+/// What the storage function must decrease by beyond the signal, in coordinates in which it is near one.
 const STRICTNESS: f64 = 1e-6;
 
 /// When the method that uses the structure has the level.
@@ -220,8 +221,8 @@ fn by_structure(count: usize, demands: &[Demand]) -> Option<(f64, Vec<DMatrix<f6
         total: None,
     };
     let found = maximise(&problem, SETTINGS, &mut |_| ())?;
-    let sound = found.converged && found.feasible;
-    sound.then(|| (-found.value, found.point.symmetric))
+    let solved = found.converged && found.feasible;
+    solved.then(|| (-found.value, found.point.symmetric))
 }
 
 /// By the general solver.

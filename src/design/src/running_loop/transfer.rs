@@ -16,8 +16,8 @@
 //! each mode (under `dwell`) the second inequality has `P` of the mode left on its right, and each mode must
 //! last for `tau` samples.
 
-use super::Subject;
 use super::model::Loop;
+use super::subject::Subject;
 use crate::Lyapunov;
 use crate::blocks::{BlockKind, BlockName};
 use crate::certificate::{CertificateError, Coordinates, Enclosure, FactoredLyapunov, require};

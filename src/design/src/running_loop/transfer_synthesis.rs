@@ -1,6 +1,6 @@
 //! The least time between resets of bumpless transfer that can be proved.
 
-use super::Subject;
+use super::subject::Subject;
 use super::transfer::{Step, TRANSFER_DECAY, TransferCertificate, prove, steps};
 use crate::Lyapunov;
 use crate::blocks::{BlockKind, BlockName};

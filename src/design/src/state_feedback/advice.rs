@@ -1,20 +1,11 @@
 //! Which change of an infeasible request helps: each is followed to certified gains before it is given.
 
-use super::synthesis::succeeds;
-use crate::{Advice, ControlSpec, Run};
-use ftc_plant::SwitchedPlant;
-use ftc_plant::scaling::Scaling;
+use crate::{Advice, ControlSpec};
 
-/// Tries the usual ways out, one per kind, the smallest change first.
-pub(super) fn search(
-    plant: &SwitchedPlant,
-    spec: &ControlSpec,
-    scaling: &Scaling,
-    run: &Run,
-) -> Vec<Advice> {
-    let works = |candidate: &ControlSpec| succeeds(plant, candidate, scaling, run);
+/// Tries one change per kind, the smallest first; `works` says whether a changed request has certified gains.
+pub(super) fn search(spec: &ControlSpec, works: &dyn Fn(&ControlSpec) -> bool) -> Vec<Advice> {
     let mut advice = Vec::new();
-    let slower = fastest_feasible_decay(spec, &works);
+    let slower = fastest_feasible_decay(spec, works);
     advice.extend(slower.map(Advice::Decay));
     let other = spec.lyapunov.weaker().iter().find_map(|&lyapunov| {
         let candidate = ControlSpec {
@@ -24,11 +15,11 @@ pub(super) fn search(
         if candidate.decay < 1.0 && works(&candidate) {
             return Some(Advice::Lyapunov(lyapunov));
         }
-        fastest_feasible_decay(&candidate, &works)
+        fastest_feasible_decay(&candidate, works)
             .map(|decay| Advice::LyapunovAndDecay(lyapunov, decay))
     });
     advice.extend(other);
-    advice.extend(fewer_outputs(spec, &works).map(Advice::Tracked));
+    advice.extend(fewer_outputs(spec, works).map(Advice::Tracked));
     let fewer_harmonics = (0..spec.resonators.len())
         .rev()
         .map(Advice::Harmonics)

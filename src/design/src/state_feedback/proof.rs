@@ -38,11 +38,18 @@ impl ClosedLoop {
     }
 }
 
+impl StateFeedback {
+    /// Proves, from these very doubles, decay, attenuation and dwell time on this plant.
+    ///
+    /// # Errors
+    /// The first inequality that cannot be proved, or what does not fit.
+    pub fn verify(&self, plant: &SwitchedPlant) -> Result<(), CertificateError> {
+        verify(plant, self)
+    }
+}
+
 /// Proves everything a state feedback claims: decay, attenuation, dwell time.
-pub(super) fn verify(
-    plant: &SwitchedPlant,
-    design: &StateFeedback,
-) -> Result<(), CertificateError> {
+fn verify(plant: &SwitchedPlant, design: &StateFeedback) -> Result<(), CertificateError> {
     check_sizes(plant, design)?;
     let (spec, certificate) = (&design.spec, &design.certificate);
     let (units, modes) = (&certificate.units, plant.modes.len());

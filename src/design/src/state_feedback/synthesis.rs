@@ -71,7 +71,8 @@ pub fn synthesise_with(
     });
     confirmed.map_err(|mut error| {
         if let Some(advice) = error.advice_mut() {
-            *advice = advice::search(plant, spec, scaling, run);
+            let works = |candidate: &ControlSpec| succeeds(plant, candidate, scaling, run);
+            *advice = advice::search(spec, &works);
         }
         error
     })
@@ -143,12 +144,7 @@ fn mean_gamma(design: &StateFeedback) -> f64 {
 
 /// Whether a request leads all the way to certified gains. The fastest test comes first: whether
 /// decay and guarantee can be had at all.
-pub(super) fn succeeds(
-    plant: &SwitchedPlant,
-    spec: &ControlSpec,
-    scaling: &Scaling,
-    run: &Run,
-) -> bool {
+fn succeeds(plant: &SwitchedPlant, spec: &ControlSpec, scaling: &Scaling, run: &Run) -> bool {
     let units = Units::choose(plant, spec, scaling);
     let models = augment(plant, spec, &units);
     let stabilised = spec.lyapunov.groups(models.len()).iter().all(|group| {

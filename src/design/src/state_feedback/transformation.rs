@@ -53,9 +53,9 @@ impl Transformation {
         let root = (sum / parts.len() as f64).cholesky()?.unpack();
         let basis = &first.basis * root;
         let inverse = basis.clone().try_inverse()?;
-        let sound = inverse.iter().all(|value| value.is_finite());
+        let finite = inverse.iter().all(|value| value.is_finite());
         let inputs = models[0].b.ncols();
-        sound.then_some(Self {
+        finite.then_some(Self {
             basis,
             inverse,
             ..Self::identity(0, inputs)

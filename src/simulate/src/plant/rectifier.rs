@@ -1,5 +1,6 @@
 //! The nonlinear rectifier's motion over one sample, and how that changes.
 
+use super::energy::Sampled;
 use crate::integrate::{self, Stalled, Tolerance};
 use ftc_control::kernel;
 use ftc_plant::rectifier::Rectifier;
@@ -7,12 +8,13 @@ use ftc_plant::rectifier::Rectifier;
 /// Accuracy of the nonlinear plant, far below any sensor's.
 const ACCURACY: Tolerance = Tolerance::new(1e-9, 1e-9);
 
-/// Moves the rectifier's state `x` over one sample under held `u` and `w`.
+/// Moves the rectifier's state `x` over one sample under held `u` and `w`: by its energy, and else by
+/// its equations of motion.
 ///
 /// # Errors
 /// [`Stalled`]; `x` is then as far as it came.
 pub(super) fn advance_rectifier(
-    rectifier: &Rectifier,
+    (rectifier, sampled): (&Rectifier, Option<&Sampled>),
     mode: usize,
     x: &mut [f64],
     u: &[f64],
@@ -24,6 +26,10 @@ pub(super) fn advance_rectifier(
     };
     let load_current = w.first().copied().unwrap_or(0.0);
     let mut state = [i_d, i_q, v];
+    if let Some(next) = sampled.and_then(|it| it.advance(mode, state, [u_d, u_q], load_current)) {
+        kernel::copy(x, &next);
+        return Ok(());
+    }
     let result = integrate::advance(&mut state, sample_time, ACCURACY, |x| {
         rectifier.derivative(mode, x, [u_d, u_q], load_current)
     });

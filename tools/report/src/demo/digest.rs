@@ -90,11 +90,11 @@ impl Digest {
         digest
     }
 
-    /// Looks at a sample; what follows one that the plant could not be integrated through is not `sound`.
-    pub fn see(&mut self, record: &Record, sound: bool) {
+    /// Looks at a sample; what follows one that the plant could not be integrated through is not `integrated`.
+    pub fn see(&mut self, record: &Record, integrated: bool) {
         let tick = record.tick as usize;
         self.samples += 1;
-        if sound {
+        if integrated {
             self.merits.add(record);
         }
         let mut any = false;

@@ -211,7 +211,7 @@ fn ratios(design: &Design, runs: &[Digest]) -> Option<(f64, f64)> {
         Some(
             outputs
                 .iter()
-                .map(|index| merits[*index].truth.mse)
+                .map(|index| merits[*index].true_output.mse)
                 .collect(),
         )
     };

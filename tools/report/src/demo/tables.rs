@@ -29,8 +29,8 @@ pub fn merits(design: &Design, digests: &[Digest]) -> Table {
                         String::new()
                     },
                     variant_name(*variant).into(),
-                    significant(merit.truth.mse),
-                    aligned(merit.truth.vaf, 2),
+                    significant(merit.true_output.mse),
+                    aligned(merit.true_output.vaf, 2),
                     significant(merit.measured.mse),
                     aligned(merit.measured.vaf, 2),
                 ],

@@ -11,7 +11,7 @@ fn healthy(design: &Design, horizon: usize, input_weight: f64) -> [f64; 2] {
         PlantSimulator::with_true_plant(design.plant.clone(), design.true_plant.clone(), scenario);
     let run = predict(design, &plant, horizon, input_weight).unwrap();
     let merits = merits(&run, design);
-    [merits[0].truth.vaf, merits[1].truth.vaf]
+    [merits[0].true_output.vaf, merits[1].true_output.vaf]
 }
 
 /// Percentage points of true VAF that a neighbouring choice may be ahead.

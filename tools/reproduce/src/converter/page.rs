@@ -173,7 +173,7 @@ fn table_2(trials: &[Trial]) -> Table {
             )
         })
     };
-    let truth = |merit: &OutputMerits| merit.truth.vaf;
+    let truth = |merit: &OutputMerits| merit.true_output.vaf;
     let measured = |merit: &OutputMerits| merit.measured.vaf;
     let healthy = |trial: &Trial| trial.case.fault.is_none();
     let voltage = |trial: &Trial| trial.case.fault.is_some_and(|(sensor, _)| sensor == 0);
@@ -373,8 +373,8 @@ fn all(trials: &[Trial]) -> Table {
             let mut cells = vec![if place == 0 { title } else { String::new() }];
             cells.push(name(variant).into());
             let outputs = trial.outputs(variant);
-            cells.extend(outputs.iter().map(|m| significant(m.truth.mse)));
-            cells.extend(outputs.iter().map(|m| aligned(m.truth.vaf, 2)));
+            cells.extend(outputs.iter().map(|m| significant(m.true_output.mse)));
+            cells.extend(outputs.iter().map(|m| aligned(m.true_output.vaf, 2)));
             cells.extend(outputs.iter().map(|m| significant(m.measured.mse)));
             cells.extend(outputs.iter().map(|m| aligned(m.measured.vaf, 2)));
             rows.push(Row {
@@ -442,7 +442,7 @@ fn facts(design: &Design) -> Vec<(String, String)> {
     fact(
         "Proposed FTC",
         format!(
-            "gains by the sound Theorem 2 from the linearisations, certified under arbitrary switching; reference window of {} \
+            "gains by the corrected Theorem 2 from the linearisations, certified under arbitrary switching; reference window of {} \
              samples; virtual sensor",
             estimator.response_length
         ),

@@ -106,11 +106,11 @@ impl Claims {
             Some(gamma) => format!(
                 "taken at its word it attenuates to γ = {}; as it is, γ = {}",
                 aligned(gamma, 4),
-                aligned(self.doubled_disturbance.sound, 4)
+                aligned(self.doubled_disturbance.corrected, 4)
             ),
             None => format!(
                 "taken at its word nothing attenuates it; as it is, γ = {}",
-                aligned(self.doubled_disturbance.sound, 4)
+                aligned(self.doubled_disturbance.corrected, 4)
             ),
         };
         claim(
@@ -238,7 +238,9 @@ fn compensation(record: &Record) -> Claim {
 fn metrics(record: &Record) -> Claim {
     let row = record.run("state", REFERENCES[1], NOISES[0], ControllerKind::NoFtc);
     let first = row.and_then(|run| run.outputs.first());
-    let (measured, truth) = first.map_or((f64::NAN, f64::NAN), |m| (m.measured.mse, m.truth.mse));
+    let (measured, truth) = first.map_or((f64::NAN, f64::NAN), |m| {
+        (m.measured.mse, m.true_output.mse)
+    });
     claim(
         "Which y, (63), (64)",
         "y is the measured output; whether it contains the fault is not said",

@@ -27,7 +27,7 @@ pub fn page(record: &Record, claims: &Claims) -> Page {
         lead: format!(
             "Yahia, Bedoui, Abderrahim, “Sensor Fault Tolerant Control for Hybrid Systems With Sinusoidal Disturbance”, \
              section VII-A: two modes, a slow sine as disturbance, both sensors wrong by 0.5 for more than half of the time. \
-             The method works, but not as printed: with sound inequalities and a healthy database its true mean square error \
+             The method works, but not as printed: with corrected inequalities and a healthy database its true mean square error \
              is at most {} times that of a controller told the fault, in all {} runs.",
             aligned(record.worst_over_told(ControllerKind::Proposed), 3),
             record
@@ -300,8 +300,8 @@ fn cells(run: &Run, first: bool) -> Vec<String> {
     vec![
         if first { run.reference } else { "" }.into(),
         run.controller.name().into(),
-        significant(mean(|m| m.truth.mse)),
-        aligned(mean(|m| m.truth.vaf), 2),
+        significant(mean(|m| m.true_output.mse)),
+        aligned(mean(|m| m.true_output.vaf), 2),
         significant(mean(|m| m.measured.mse)),
         aligned(mean(|m| m.measured.vaf), 2),
         significant(run.over_told),

@@ -81,7 +81,7 @@ pub fn absorption() -> Absorption {
 #[derive(Clone, Debug, Serialize)]
 pub struct DoubledDisturbance {
     /// Attenuation with the integrator driven by `-Te S F w`, as it is.
-    pub sound: f64,
+    pub corrected: f64,
     /// Attenuation with `diag(E, E)` as in (24); absent when infeasible.
     pub printed: Option<f64>,
 }
@@ -90,7 +90,7 @@ pub struct DoubledDisturbance {
 /// enters the output by `F = -E / Te`.
 pub fn doubled_disturbance() -> Result<DoubledDisturbance, Error> {
     let Request { plant, control, .. } = request()?;
-    let sound = synthesise(&plant, &control)?;
+    let corrected = synthesise(&plant, &control)?;
     let te = plant.sample_time;
     let double = |mode: &Mode| {
         let (n, s) = mode.e.shape();
@@ -109,7 +109,7 @@ pub fn doubled_disturbance() -> Result<DoubledDisturbance, Error> {
     };
     let doubled = SwitchedPlant::new(te, plant.modes.iter().map(double).collect());
     Ok(DoubledDisturbance {
-        sound: largest(&sound.gamma).unwrap_or(f64::NAN),
+        corrected: largest(&corrected.gamma).unwrap_or(f64::NAN),
         printed: synthesise(&doubled, &control)
             .ok()
             .and_then(|feedback| largest(&feedback.gamma)),

@@ -50,7 +50,7 @@ impl Reference {
         let of = |who: ControllerKind| {
             let mut all = found.iter().filter(|(controller, _)| *controller == who);
             let merits = all.next().and_then(|(_, merits)| merits.first());
-            merits.map_or(nothing, |merits| merits.truth)
+            merits.map_or(nothing, |merits| merits.true_output)
         };
         let reference = signals.first().map_or(&[][..], |signal| signal);
         let late: Vec<f64> = std::iter::once(0.0)

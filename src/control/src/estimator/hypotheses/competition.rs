@@ -191,7 +191,7 @@ impl Bank {
     }
 
     /// Keeps the best candidates, few of a kind, and always one in which the plant is the model and no sensor
-    /// is flagged.
+    /// is flagged, and which may be used: without it nothing might be left to use.
     fn select(&self, state: &mut BankState) {
         let order = |a: &Candidate, b: &Candidate| {
             b.score.total_cmp(&a.score).then(a.parent.cmp(&b.parent))
@@ -211,7 +211,7 @@ impl Bank {
         for index in 0..state.candidates.count {
             let candidate = state.candidates.list[index];
             let kind = self.kind(state, &candidate);
-            let unflagged = (kind.0, kind.1) == (0, false);
+            let unflagged = (kind.0, kind.1) == (0, false) && candidate.convinced;
             let most = self.tuning.kept as usize - usize::from(!plain);
             let stays = candidate.score >= best - margin && kept < most;
             if !stays && (plain || !unflagged) {

@@ -30,8 +30,7 @@ impl Bank {
             Action::Bias(set) | Action::Change(set) => {
                 for q in (0..p).filter(|&q| has(set, q)) {
                     let k = fault + q;
-                    let additive = self.output_error() || has(parent.additive, q);
-                    if has(parent.stuck | parent.scaled, q) || !additive {
+                    if self.opens_anew(parent, candidate.action, q) {
                         child.open(k, 0.0, self.fault_variance(q));
                     } else {
                         child.cov[k * stride + k] += self.fault_variance(q);
@@ -100,13 +99,25 @@ impl Bank {
         }
     }
 
+    /// Whether nothing of the entry of the fault of sensor `q` is left: it held another kind of fault, or none.
+    pub(super) fn opens_anew(&self, parent: &Hypothesis, action: Action, q: usize) -> bool {
+        match action {
+            Action::Bias(set) | Action::Change(set) => {
+                let additive = self.output_error() || has(parent.additive, q);
+                has(set, q) && (has(parent.stuck | parent.scaled, q) || !additive)
+            }
+            Action::Release(set) => has(set, q),
+            _ => false,
+        }
+    }
+
     /// Variance of the fault of sensor `q` when it begins.
-    fn fault_variance(&self, q: usize) -> f64 {
+    pub(super) fn fault_variance(&self, q: usize) -> f64 {
         self.settings.fault_size[q] * self.settings.fault_size[q]
     }
 
     /// Variance of the fault entry of a healthy sensor.
-    fn healthy_variance(&self, model: &ModeModel, q: usize) -> f64 {
+    pub(super) fn healthy_variance(&self, model: &ModeModel, q: usize) -> f64 {
         match self.output_error() {
             true => model.most[self.layout.fault() + q],
             false => 0.0,

@@ -22,7 +22,7 @@ mod propose;
 mod start;
 mod trial;
 
-use crate::tuning::BankTuning;
+use crate::tuning::{BankTuning, MOST_KEPT};
 use alloc::vec::Vec;
 pub use hypothesis::{Hypothesis, Reading, Sensors, has};
 pub use model::Layout;
@@ -39,8 +39,6 @@ use trial::Expectation;
 
 /// Most modes where the mode is not told: each but the leading one needs a hypothesis.
 pub const MOST_MODES: usize = 9;
-/// Most hypotheses that may be kept after a sample.
-pub const MOST_KEPT: usize = 12;
 /// Most hypotheses that may exist while a sample is judged.
 const SLOTS: usize = 2 * MOST_KEPT + MOST_MODES - 1;
 

@@ -152,6 +152,9 @@ impl Bank {
                     let factor = 1.0 + self.tuning.gain_fault_mean;
                     ([factor, 0.0], factor * expectation.output[q])
                 }
+                _ if self.opens_anew(&state.slots[slot], action, q) => {
+                    ([1.0, 0.0], expectation.output[q])
+                }
                 _ => expectation.weigh(q, kinds, bias),
             };
             r[q] = reading.y[q] - expected;
@@ -175,24 +178,38 @@ impl Bank {
         action: Action,
     ) {
         let Layout { n, m, p, .. } = self.layout;
-        let (settings, h) = (&self.settings, &state.slots[slot]);
-        let (s, u) = (&mut state.trial.s, &state.u);
-        let moving = reading.valid & !self.sets(h, action).stuck;
+        let (settings, h, u) = (&self.settings, &state.slots[slot], &state.u);
+        let Innovation { s, weights, .. } = &mut state.trial;
+        let scale = |q: usize, j: usize| weights[q][0] * weights[j][0];
         match action {
             Action::Load(jump) => {
                 let jump = &model.jumps[jump];
                 let variance = settings.gain_error * settings.gain_error;
-                add_pairs(s, p, moving, |q, j| {
+                add_pairs(s, p, reading.valid, |q, j| {
                     let gains = jump.gains.clone().map(|k| {
                         let left = model.cb[q * m + k] * u[k];
                         variance * left * (model.cb[j * m + k] * u[k])
                     });
-                    jump.seen[q * p + j] + gains.sum::<f64>()
+                    scale(q, j) * (jump.seen[q * p + j] + gains.sum::<f64>())
                 });
             }
-            Action::Bias(set) | Action::Change(set) | Action::Drift(set) => {
+            Action::Bias(set) | Action::Change(set) => {
                 for q in (0..p).filter(|&q| has(set & reading.valid, q)) {
-                    s[q * p + q] += settings.fault_size[q] * settings.fault_size[q];
+                    s[q * p + q] += self.fault_variance(q);
+                }
+            }
+            Action::Release(set) => {
+                for q in (0..p).filter(|&q| has(set & reading.valid, q)) {
+                    s[q * p + q] += self.healthy_variance(model, q);
+                }
+            }
+            Action::Unloaded | Action::UsualLoad | Action::Drift(_) => {
+                let drifted = self.sets(h, action).additive;
+                for q in (0..p).filter(|&q| has(reading.valid, q)) {
+                    s[q * p + q] += match has(drifted, q) {
+                        true => self.fault_variance(q),
+                        false => self.healthy_variance(model, q),
+                    };
                 }
             }
             Action::Scale(q) => {
@@ -211,16 +228,12 @@ impl Bank {
             }),
             Action::Loosen => {
                 for (i, variance) in self.looseness(model, h, u).enumerate() {
-                    add_pairs(s, p, moving, |q, j| {
-                        variance * model.c[q * n + i] * model.c[j * n + i]
+                    add_pairs(s, p, reading.valid, |q, j| {
+                        scale(q, j) * (variance * model.c[q * n + i] * model.c[j * n + i])
                     });
                 }
             }
-            Action::Stay
-            | Action::Tighten
-            | Action::Release(_)
-            | Action::Unloaded
-            | Action::UsualLoad => {}
+            Action::Stay | Action::Tighten => {}
         }
     }
 }

@@ -28,10 +28,27 @@ const ASIDE: &str = ".replaced";
 #[error("{}: {what}", directory.display())]
 #[non_exhaustive]
 pub struct Error {
-    /// The output directory.
+    /// The output directory, or the file that could not be written.
     pub directory: PathBuf,
     /// What is wrong with it, and what to do.
     pub what: String,
+}
+
+impl Error {
+    /// A file that could not be written, of which the user names the directory.
+    pub fn of_file(file: &Path, error: &io::Error) -> Self {
+        blame(file, error)
+    }
+}
+
+/// Writes all files into a directory, or none, and returns their paths in alphabetical order.
+///
+/// # Errors
+/// One sentence that names the directory.
+pub fn write(out: &Path, files: &[(String, Vec<u8>)]) -> Result<Vec<PathBuf>, Error> {
+    let staging = Staging::new(out)?;
+    staging.add_all(files)?;
+    staging.commit()
 }
 
 /// Files are collected in a temporary directory inside the output directory and moved into place
@@ -95,6 +112,16 @@ impl Staging {
     /// One sentence that names the directory.
     pub fn add(&self, name: &str, bytes: &[u8]) -> Result<(), Error> {
         self.add_written(name, |file| file.write_all(bytes))
+    }
+
+    /// Adds several files.
+    ///
+    /// # Errors
+    /// One sentence that names the directory.
+    pub fn add_all(&self, files: &[(String, Vec<u8>)]) -> Result<(), Error> {
+        files
+            .iter()
+            .try_for_each(|(name, bytes)| self.add(name, bytes))
     }
 
     /// Adds a file that is written piece by piece.

@@ -1,6 +1,5 @@
-//! The examples of the repository, within the program.
+//! The examples of the repository, at hand without it.
 
-use crate::failure::Failure;
 use std::fmt::Write;
 
 /// An example: its name, what it shows, and its files, the one to start from first.
@@ -107,8 +106,8 @@ pub fn names() -> Vec<&'static str> {
 /// Name and contents of an example's files, the one to start from first.
 ///
 /// # Errors
-/// There is no such example; one sentence.
-pub fn files(name: &str) -> Result<Vec<(String, Vec<u8>)>, Failure> {
+/// There is no such example.
+pub fn files(name: &str) -> Result<Vec<(String, Vec<u8>)>, UnknownExample> {
     let wanted = name.trim_end_matches(".toml").trim_end_matches(".py");
     let found = EXAMPLES.iter().find(|example| example.name == wanted);
     found
@@ -123,10 +122,11 @@ pub fn files(name: &str) -> Result<Vec<(String, Vec<u8>)>, Failure> {
                 })
                 .collect()
         })
-        .ok_or_else(|| {
-            Failure::Input(format!(
-                "there is no example \"{name}\": name one of {}",
-                names().join(", ")
-            ))
-        })
+        .ok_or_else(|| UnknownExample(name.to_owned()))
 }
+
+/// No example has this name.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("there is no example \"{0}\": name one of {names}", names = names().join(", "))]
+#[non_exhaustive]
+pub struct UnknownExample(pub String);

@@ -1,14 +1,47 @@
-//! Matrices in binary formats: numbers of rows and columns (32 bits each), then the entries (64 bits
+//! A matrix is serialised as a list of rows, in binary formats as bytes: numbers of rows and columns (32 bits each), then the entries (64 bits
 //! each) column after column, all little-endian. Of a triangular matrix only the triangle is written.
 
 use super::Matrix;
 use alloc::vec::Vec;
 use core::fmt;
-use serde::de::{Deserializer, Error, Visitor};
-use serde::ser::{self, Serialize, Serializer};
+use serde::de::{Deserialize, Deserializer, Error, Visitor};
+use serde::ser::{self, Serialize, SerializeSeq, Serializer};
+
+/// One row of a matrix, to be serialised.
+struct Row<'a>(&'a Matrix, usize);
+
+impl Serialize for Row<'_> {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        serializer.collect_seq(self.0.row(self.1))
+    }
+}
+
+impl Serialize for Matrix {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        if !serializer.is_human_readable() {
+            let entries = self.entries.iter().copied();
+            return serialize(self.shape(), entries, serializer);
+        }
+        let mut rows = serializer.serialize_seq(Some(self.rows))?;
+        for row in 0..self.rows {
+            rows.serialize_element(&Row(self, row))?;
+        }
+        rows.end()
+    }
+}
+
+impl<'de> Deserialize<'de> for Matrix {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        if !deserializer.is_human_readable() {
+            return deserializer.deserialize_bytes(Reader::<false>);
+        }
+        let rows = Vec::<Vec<f64>>::deserialize(deserializer)?;
+        Self::try_from_rows(&rows).map_err(D::Error::custom)
+    }
+}
 
 /// Writes the sizes and these entries.
-pub(super) fn serialize<S: Serializer>(
+fn serialize<S: Serializer>(
     (rows, columns): (usize, usize),
     entries: impl Iterator<Item = f64>,
     serializer: S,
@@ -23,7 +56,7 @@ pub(super) fn serialize<S: Serializer>(
 }
 
 /// Reads a matrix of which every entry, or with `TRIANGLE` the upper triangle, was written.
-pub(super) struct Reader<const TRIANGLE: bool>;
+struct Reader<const TRIANGLE: bool>;
 
 impl<const TRIANGLE: bool> Visitor<'_> for Reader<TRIANGLE> {
     type Value = Matrix;
@@ -75,7 +108,6 @@ fn read<const TRIANGLE: bool>(bytes: &[u8]) -> Option<Matrix> {
 /// others all rows.
 pub(crate) mod upper_triangle {
     use super::*;
-    use serde::Deserialize;
 
     pub(crate) fn serialize<S: Serializer>(
         matrix: &Matrix,

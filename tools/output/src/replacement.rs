@@ -1,6 +1,6 @@
 //! One file that is written whole or not at all.
 
-use crate::output::recover;
+use crate::directory::recover;
 use crate::unfinished::{self, HIDDEN, Unfinished};
 use std::fs::File;
 use std::io;
