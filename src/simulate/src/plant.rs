@@ -1,5 +1,6 @@
 //! The plant under a scenario, sample by sample: what the plant FMU runs.
 
+mod departed;
 mod departure;
 mod derivative;
 mod energy;
@@ -11,7 +12,7 @@ pub use derivative::Change;
 pub use injection::{Injected, LAST_INJECTED_KIND};
 
 use super::integrate::Stalled;
-use departure::Departed;
+use departed::Departed;
 use energy::Sampled;
 use ftc_control::state::State;
 use ftc_control::{Matrix, kernel};

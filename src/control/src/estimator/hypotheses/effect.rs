@@ -1,6 +1,6 @@
 //! What happened, done to the hypothesis to which it did.
 
-use super::competition::{Action, Candidate};
+use super::candidates::{Action, Candidate};
 use super::hypothesis::{Hypothesis, Reading, has};
 use super::model::ModeModel;
 use super::model_run::ModelRun;

@@ -11,8 +11,10 @@
 //! given odds. What grows slowly can be a load or a sensor's drift: `suspect` names the sensors, and
 //! the policy decides. Where no hypothesis fits, the readings are used as they are and `model_valid` is false.
 
+mod candidates;
 mod competition;
 mod effect;
+mod expectation;
 mod hypothesis;
 mod linear;
 mod model;
@@ -29,13 +31,13 @@ pub use model::Layout;
 
 use super::super::parameters::Hypotheses;
 use crate::compensation::is_measurement;
-use competition::Candidates;
+use candidates::Candidates;
+use expectation::Expectation;
 use hypothesis::{Innovation, Step};
 use linear::dot;
 use model::ModeModel;
 use model_run::ModelRun;
 use serde::{Deserialize, Serialize};
-use trial::Expectation;
 
 /// Most modes where the mode is not told: each but the leading one needs a hypothesis.
 pub const MOST_MODES: usize = 9;

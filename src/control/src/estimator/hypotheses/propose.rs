@@ -1,6 +1,6 @@
 //! What may have happened to a hypothesis since the last sample.
 
-use super::competition::{Action, Candidate};
+use super::candidates::{Action, Candidate};
 use super::hypothesis::{Hypothesis, Reading, Sensors, has};
 use super::model::ModeModel;
 use super::model_run::ModelRun;

@@ -1,12 +1,12 @@
 //! From the plant and the settings to an estimator ready to run.
 
-use super::competition::Candidates;
+use super::candidates::Candidates;
+use super::expectation::Expectation;
 use super::hypothesis::{Hypothesis, Innovation};
 use super::linear::{axpy, factor, solve};
 use super::model::{Layout, ModeModel};
 use super::model_run::ModelRun;
 use super::modes::differ_at_once;
-use super::trial::Expectation;
 use super::{Bank, BankState, LogRates, SlotsInUse};
 use crate::matrix::Matrix;
 use crate::parameters::{Hypotheses, ModeModel as Described};
