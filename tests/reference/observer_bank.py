@@ -1,7 +1,7 @@
-"""Hypotheses in competition: what may have happened at a sample, at which price, and which explanation is used.
+"""Hypotheses in competition: what may have happened at a sample, at which log_rate, and which explanation is used.
 
 Each candidate is the hypothesis that the happening leaves, made first and judged by the likelihood of the readings
-under it; only where all loads are gone, readings are compared with the model's own run.
+under it; only where all loads are gone, readings are compared with the model in open loop.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable
 
 
-class OwnRun:
+class ModelRun:
     """What the plant would do under the commands alone, or with the usual loads, and how far that is right."""
 
     def __init__(self, plant: Plant, settings: dict, tuning: dict) -> None:
@@ -93,7 +93,7 @@ class Repeats:
         self.mean, self.count = np.zeros(outputs), np.zeros(outputs)
         self.value, self.moved_from = np.zeros(outputs), np.zeros(outputs)
 
-    def watch(self, h: Hypothesis, seen: Seen, reading: Reading, run: OwnRun) -> None:
+    def watch(self, h: Hypothesis, seen: Seen, reading: Reading, run: ModelRun) -> None:
         """Takes a sample in: the likelihood of a constant against that of the hypothesis."""
         self.before = self.evidence.copy()
         for q, y in enumerate(reading.y):
@@ -130,7 +130,7 @@ class Candidate:
     convinced: bool
     kinds: tuple[frozenset[int], ...]
     loose: bool
-    misfit_price: float = 0.0
+    misfit_penalty: float = 0.0
     make: Callable[[], Hypothesis] | None = None
 
     @property
@@ -162,16 +162,16 @@ class Bank:
         self.at = self.plants[0].layout
         self.trusts_model = self.settings["ambiguous"] == "trust-model"
         self.outputs_may_err = self.at.p > self.at.n
-        self.price = {
+        self.log_rate = {
             name: math.log(self.settings[name + "_rate"]) for name in ("fault", "stuck", "release", "change", "load")
         }
         rate = self.settings.get("mode_rate")
         self.finds_mode = rate is not None
-        self.mode_price = math.log(rate) if self.finds_mode else 0.0
+        self.mode_log_rate = math.log(rate) if self.finds_mode else 0.0
         order = [mode, *(k for k in range(len(modes)) if k != mode and self.finds_mode)]
-        self.live = [self._at_rest(k) for k in order]
+        self.hypotheses = [self._at_rest(k) for k in order]
         self.seen: dict[int, Seen] = {}
-        self.best = self.live[0]
+        self.best = self.hypotheses[0]
         self.mode = self.moved_by = mode
         self.probability = np.zeros(len(modes))
         self.u, self.moved = self.plants[mode].u0, np.zeros(self.at.m)
@@ -181,7 +181,7 @@ class Bank:
         self.noise_samples = self.tuning["noise_prior"]
         self.noise = np.zeros(p)
         self.repeats = Repeats(p, self.tuning)
-        self.own, self.usual = (OwnRun(self.plants[mode], self.settings, self.tuning) for _ in range(2))
+        self.unloaded, self.usual = (ModelRun(self.plants[mode], self.settings, self.tuning) for _ in range(2))
         self.apart = self.suspect = self.flagged = NOBODY
         self.misfit, self.model_valid = float(p), True
         self.expected, self.residual, self.load = np.zeros(p), np.zeros(p), np.zeros(self.at.m)
@@ -210,25 +210,25 @@ class Bank:
         reading = Reading(y, np.isfinite(y), self.noise)
         if not self.finds_mode:
             self._tell(told)
-        for run in (self.own, self.usual):
+        for run in (self.unloaded, self.usual):
             run.read(self.plants[self.best.mode], self.best.z[self.at.wave], self.noise)
-        self.seen = {id(h): self._predict(h, reading) for h in self.live}
-        head = self.live[0]
-        self.repeats.watch(head, self.seen[id(head)], reading, self.own)
-        if self._is_calm(head):
+        self.seen = {id(h): self._predict(h, reading) for h in self.hypotheses}
+        head = self.hypotheses[0]
+        self.repeats.watch(head, self.seen[id(head)], reading, self.unloaded)
+        if self._nothing_happened(head):
             self._go_on()
         else:
             self._compete(reading)
         self.first = False
         self.mode = self.best.mode
-        self._correct_own_runs()
+        self._correct_model_runs()
         self._learn_noise(reading)
         self._conclude(reading)
 
     def _predict(self, h: Hypothesis, reading: Reading) -> Seen:
         return h.predict(self.plants[h.mode], reading, outputs_may_err=self.outputs_may_err)
 
-    def _is_calm(self, head: Hypothesis) -> bool:
+    def _nothing_happened(self, head: Hypothesis) -> bool:
         seen = self.seen[id(head)]
         return (
             not head.flagged
@@ -243,10 +243,10 @@ class Bank:
         )
 
     def _is_undisputed(self, head: Hypothesis) -> bool:
-        after = {id(h): h.score + self.seen[id(h)].likelihood for h in self.live}
+        after = {id(h): h.score + self.seen[id(h)].likelihood for h in self.hypotheses}
         return all(
             self._stands_for(h, head, h.mode) and h.mode != head.mode and after[id(h)] <= after[id(head)]
-            for h in self.live[1:]
+            for h in self.hypotheses[1:]
         )
 
     @staticmethod
@@ -254,9 +254,9 @@ class Bank:
         return h.mode == mode and h.kinds == leading.kinds and h.loose == leading.loose and h.convinced
 
     def _go_on(self) -> None:
-        head = self.live[0]
+        head = self.hypotheses[0]
         lead = head.score + self.seen[id(head)].likelihood
-        for h in self.live:
+        for h in self.hypotheses:
             seen = self.seen[id(h)]
             h.score += seen.likelihood - lead
             h.update(seen)
@@ -270,26 +270,26 @@ class Bank:
 
     def _compete(self, reading: Reading) -> None:
         candidates: list[Candidate] = []
-        for index, h in enumerate(self.live):
+        for index, h in enumerate(self.hypotheses):
             candidates += Proposals(self, index, h, reading).all()
         kept = self._select(sorted(candidates, key=lambda c: -c.score))
         children = []
         for candidate in kept:
-            h = candidate.make() if candidate.make else self.live[candidate.parent]
+            h = candidate.make() if candidate.make else self.hypotheses[candidate.parent]
             seen = self._predict(h, reading) if candidate.make else self.seen[id(h)]
             children.append((candidate, h, seen))
         for candidate, h, seen in children:
             h.update(seen)
             h.score, h.convinced = candidate.score, candidate.convinced
-            h.misfit += self.tuning["misfit_share"] * (min(seen.square, 1e3) + candidate.misfit_price - h.misfit)
-        self.live = [h for _, h, _ in children]
+            h.misfit += self.tuning["misfit_share"] * (min(seen.square, 1e3) + candidate.misfit_penalty - h.misfit)
+        self.hypotheses = [h for _, h, _ in children]
         self.seen = {id(h): seen for _, h, seen in children}
         self._decide(reading)
 
     def _select(self, candidates: list[Candidate]) -> list[Candidate]:
         """Returns the best, few of a kind, and always one without a fault whose plant is the model; scores anew."""
         most = max(c.score for c in candidates if c.convinced)
-        margin = self.settings["odds"] - min(self.price["fault"], self.price["load"])
+        margin = self.settings["odds"] - min(self.log_rate["fault"], self.log_rate["load"])
         kept: list[Candidate] = []
         plain = False
         for c in candidates:
@@ -297,9 +297,9 @@ class Bank:
             stays = c.score >= most - margin and len(kept) < self.tuning["kept"] - (not plain)
             if not stays and (plain or not is_plain):
                 continue
-            mode = self.live[c.parent].mode
+            mode = self.hypotheses[c.parent].mode
             kind = (c.flagged, c.loose, c.convinced, mode)
-            alike = sum((o.flagged, o.loose, o.convinced, self.live[o.parent].mode) == kind for o in kept)
+            alike = sum((o.flagged, o.loose, o.convinced, self.hypotheses[o.parent].mode) == kind for o in kept)
             if alike >= self.tuning["per_sensor_set"] or self._is_twin(c, kept):
                 continue
             plain = plain or is_plain
@@ -314,9 +314,9 @@ class Bank:
         """Whether one goes on from the same estimate under the same assumptions."""
         if candidate.make:
             return False
-        h, share = self.live[candidate.parent], self.tuning["same_estimate"]
+        h, share = self.hypotheses[candidate.parent], self.tuning["same_estimate"]
         for other in kept:
-            o = self.live[other.parent]
+            o = self.hypotheses[other.parent]
             same = (o.kinds, o.loose, o.convinced, o.mode) == (h.kinds, h.loose, h.convinced, h.mode)
             twins = not other.make and same and o.has_estimate(h.z, share)
             if twins and self.seen[id(o)].leaves(self.seen[id(h)].r, share):
@@ -329,12 +329,12 @@ class Bank:
         """A sensor's fault must beat the best explanation without one by its odds."""
         mode, p = self._decide_mode(), self.at.p
         eligible: list[tuple[float, Hypothesis]] = []
-        for h in self.live:
+        for h in self.hypotheses:
             value = h.score - (self.settings["odds"] if h.flagged and not self.trusts_model else 0.0)
             fits = not h.flagged or (h.misfit < 3.0 * p + 6.0 and self.seen[id(h)].square < 20.0 + 4.0 * p)
             if h.convinced and fits and h.mode == mode:
                 eligible.append((value, h))
-        self.best = self.live[0]
+        self.best = self.hypotheses[0]
         if eligible:
             ranked = sorted(eligible, key=lambda pair: -pair[0])
             self.best = ranked[0][1]
@@ -343,36 +343,36 @@ class Bank:
         decided = self.best.flagged
         self.suspect = frozenset(
             q
-            for h in self.live
+            for h in self.hypotheses
             if h.score >= self.best.score
             for q in h.flagged - decided
             if q not in h.additive or abs(h.z[self.at.fault[q]]) > 6.0 * reading.noise[q]
         )
-        where = next(i for i, h in enumerate(self.live) if h is self.best)
-        self.live[0], self.live[where] = self.live[where], self.live[0]
+        where = next(i for i, h in enumerate(self.hypotheses) if h is self.best)
+        self.hypotheses[0], self.hypotheses[where] = self.hypotheses[where], self.hypotheses[0]
 
     def _decide_mode(self) -> int:
         if not self.finds_mode:
-            return self.live[0].mode
+            return self.hypotheses[0].mode
         self._weigh_modes()
         likeliest = int(np.flatnonzero(self.probability == self.probability.max())[-1])
         ahead = self.probability[likeliest] > math.exp(self.settings["odds"]) * self.probability[self.mode]
         return likeliest if ahead else self.mode
 
     def _weigh_modes(self) -> None:
-        scores = [(h.mode, h.score) for h in self.live if h.convinced]
+        scores = [(h.mode, h.score) for h in self.hypotheses if h.convinced]
         most = max((score for _, score in scores), default=-math.inf)
         weights = np.zeros(len(self.plants))
         for mode, score in scores:
             weights[mode] += math.exp(min(score - most, 0.0))
         self.probability = weights / weights.sum()
 
-    def _correct_own_runs(self) -> None:
+    def _correct_model_runs(self) -> None:
         """Repeats the last move where the plant was in another mode than thought."""
         if self.best.moved_by == self.moved_by:
             return
         self.moved_by = self.best.moved_by
-        for run in (self.own, self.usual):
+        for run in (self.unloaded, self.usual):
             run.repeat(self.plants[self.moved_by], self.u)
             run.read(self.plants[self.mode], self.best.z[self.at.wave], self.noise)
 
@@ -403,9 +403,9 @@ class Bank:
         loads, gains = best.z[at.load], best.z[at.gain]
         self.load = loads[: at.m] + self.u * gains + plant.Bplus @ (plant.G[:, at.m :] @ loads[at.m :])
         self.actuator_fault = np.abs(self.load) > np.array(self.settings["input_load"])
-        far = self.own.displaced(self.expected, self.tuning["displaced"])
-        self.apart = self.own.displaced(self.expected, self.tuning["returned"])
-        self.own.learn(self.expected)
+        far = self.unloaded.displaced(self.expected, self.tuning["displaced"])
+        self.apart = self.unloaded.displaced(self.expected, self.tuning["returned"])
+        self.unloaded.learn(self.expected)
         self.usual.learn(self.expected)
         if not best.flagged and not best.loose:
             self.usual.learn_loads(loads, gains)
@@ -416,12 +416,12 @@ class Bank:
     def advance(self, u: np.ndarray) -> None:
         """Moves one sample on, under the input that acts."""
         self.moved, self.u = u - self.u, u
-        for run in (self.own, self.usual):
+        for run in (self.unloaded, self.usual):
             run.advance(self.plants[self.mode], self.best.z[self.at.wave].copy(), u)
         self.moved_by = self.mode
         self._branch(shows_at_once=False)
         motion = Motion(u, self.moved, self.outputs_may_err)
-        for h in self.live:
+        for h in self.hypotheses:
             h.advance(self.plants[h.mode], self.settings, self.noise, motion)
         self._branch(shows_at_once=True)
 
@@ -429,12 +429,12 @@ class Bank:
         """Sets a hypothesis for each other mode beside the leading one: entered at this sample, or before."""
         if not self.finds_mode:
             return
-        head = self.live[0]
+        head = self.hypotheses[0]
         for mode, plant in enumerate(self.plants):
             if mode == head.mode or self.plants[head.mode].shows_unlike(plant) != shows_at_once:
                 continue
-            score = head.score + self.mode_price
-            standing = [h for h in self.live[1:] if self._stands_for(h, head, mode)]
+            score = head.score + self.mode_log_rate
+            standing = [h for h in self.hypotheses[1:] if self._stands_for(h, head, mode)]
             old = max(standing, key=lambda h: h.score, default=None)
             if old and old.score >= score - self.tuning["switch_restart"]:
                 continue
@@ -442,12 +442,12 @@ class Bank:
             child.score = score
             self._enter(child, mode)
             if old:
-                self.live[next(i for i, h in enumerate(self.live) if h is old)] = child
+                self.hypotheses[next(i for i, h in enumerate(self.hypotheses) if h is old)] = child
             else:
-                self.live.append(child)
+                self.hypotheses.append(child)
 
     def _tell(self, mode: int) -> None:
-        for h in self.live:
+        for h in self.hypotheses:
             if self.first:
                 h.mode = h.moved_by = mode
             elif h.mode != mode:
@@ -471,7 +471,7 @@ class Proposals:
     def __init__(self, bank: Bank, index: int, h: Hypothesis, reading: Reading) -> None:
         """Starts with that all goes on."""
         self.bank, self.index, self.h, self.reading = bank, index, h, reading
-        self.plant, self.at, self.tuning, self.price = bank.plants[h.mode], bank.at, bank.tuning, bank.price
+        self.plant, self.at, self.tuning, self.log_rate = bank.plants[h.mode], bank.at, bank.tuning, bank.log_rate
         self.seen = bank.seen[id(h)]
         self.unlikely = self.seen.square > min(
             self.tuning["quiet_beside"],
@@ -507,11 +507,11 @@ class Proposals:
         return Trial(child, self.bank._predict(child, self.reading))  # noqa: SLF001
 
     def _add(
-        self, name: str, price: float, change: Callable[[Hypothesis], None], *, convinced: bool, misfit: float = 0.0
+        self, name: str, log_rate: float, change: Callable[[Hypothesis], None], *, convinced: bool, misfit: float = 0.0
     ) -> None:
         """Adds a candidate; the bias or wrong gain that it finds counts only where this one sample speaks for it."""
         trial = self._try(change)
-        score = self.h.score + price + trial.seen.likelihood
+        score = self.h.score + log_rate + trial.seen.likelihood
         by_residual = name in ("bias", "scale") and not self.bank.trusts_model
         convinced = convinced and (not by_residual or score > self.stay)
         child = trial.child
@@ -526,28 +526,28 @@ class Proposals:
             jumps = self.plant.jumps
             for number, jump in enumerate(jumps):
                 several = {0: tuning["everything"], len(jumps) - 1: tuning["several"]}.get(number, 1.0)
-                self._add("load", several * self.price["load"], self._jumped(jump), convinced=h.convinced)
+                self._add("load", several * self.log_rate["load"], self._jumped(jump), convinced=h.convinced)
             if not h.loose:
-                price = tuning["everything"] * self.price["load"]
-                self._add("loosen", price, self._loosened, convinced=h.convinced)
+                log_rate = tuning["everything"] * self.log_rate["load"]
+                self._add("loosen", log_rate, self._loosened, convinced=h.convinced)
         if h.loose:
             tight = Candidate(
-                "tighten", self.stay + self.price["release"], self.index, h.convinced, h.kinds, loose=False
+                "tighten", self.stay + self.log_rate["release"], self.index, h.convinced, h.kinds, loose=False
             )
             tight.make = self._tightened
             self.list.append(tight)
         if bank.first:
             if not h.flagged:
-                price = self.price["fault"]
-                self._add("start", price, self._started, convinced=h.convinced, misfit=-2.0 * price)
+                log_rate = self.log_rate["fault"]
+                self._add("start", log_rate, self._started, convinced=h.convinced, misfit=-2.0 * log_rate)
             return
-        for name, run in (("home", bank.own), ("return", bank.usual)):
+        for name, run in (("home", bank.unloaded), ("return", bank.usual)):
             if self.unlikely and run.displaced(self.seen.output, tuning["returned"]):
-                # What stands against the loads that would then be gone makes up for the price of a fault.
+                # What stands against the loads that would then be gone makes up for the log_rate of a fault.
                 off = (h.z[self.at.load] - run.loads)[self.plant.load_size > 0.0]
                 against = 0.5 * np.sum((off / self.plant.load_size[self.plant.load_size > 0.0]) ** 2)
-                price = min(self.price["fault"] + against, 0.0)
-                score = h.score + price + self._run_seen(run, NOBODY).likelihood
+                log_rate = min(self.log_rate["fault"] + against, 0.0)
+                score = h.score + log_rate + self._run_seen(run, NOBODY).likelihood
                 self._put_back(name, run, NOBODY, score=score, convinced=h.convinced)
         if not h.flagged:
             self._drifted()
@@ -578,7 +578,7 @@ class Proposals:
     def _started(self, child: Hypothesis) -> None:
         child.P[self.at.x, self.at.x] += np.square(self.bank.settings["start_elsewhere"])
 
-    def _run_seen(self, run: OwnRun, drifted: frozenset[int]) -> Seen:
+    def _run_seen(self, run: ModelRun, drifted: frozenset[int]) -> Seen:
         """What the sample says if no load acts and these sensors have drifted."""
         valid = self.reading.valid
         opened = np.array([self._opened(q, drifted) for q in range(self.at.p)])
@@ -586,16 +586,16 @@ class Proposals:
         S = run.covariance * np.outer(valid, valid) + np.diag(own)
         return Seen(np.where(valid, self.reading.y - run.y, 0.0), S, run.y)
 
-    def _put_back(self, name: str, run: OwnRun, drifted: frozenset[int], *, score: float, convinced: bool) -> None:
+    def _put_back(self, name: str, run: ModelRun, drifted: frozenset[int], *, score: float, convinced: bool) -> None:
         candidate = Candidate(name, score, self.index, convinced, (drifted, NOBODY, NOBODY), self.h.loose)
-        candidate.misfit_price = -2.0 * self.price["fault"]
+        candidate.misfit_penalty = -2.0 * self.log_rate["fault"]
         candidate.make = lambda: self._at_run(run, drifted)
         self.list.append(candidate)
 
     def _opened(self, q: int, drifted: frozenset[int]) -> float:
         return self.fault_size[q] ** 2 if q in drifted else self._healthy_variance(q)
 
-    def _at_run(self, run: OwnRun, drifted: frozenset[int]) -> Hypothesis:
+    def _at_run(self, run: ModelRun, drifted: frozenset[int]) -> Hypothesis:
         """Returns the hypothesis put back to a run of the model: its state, its loads, no other faults."""
         child, at = self.h.copy(), self.at
         child.additive, child.stuck, child.scaled = drifted, NOBODY, NOBODY
@@ -612,20 +612,20 @@ class Proposals:
         return child
 
     def _drifted(self) -> None:
-        """The sensors that have left the model's own run may have drifted, and no load acts."""
+        """The sensors that have left the model in open loop may have drifted, and no load acts."""
         bank = self.bank
         limit = self.tuning["displaced" if bank.trusts_model else "returned"]
-        drifted = bank.own.displaced(self.seen.output, limit) & self.valid
-        known = any(other.additive == drifted and not other.convinced for other in bank.live)
+        drifted = bank.unloaded.displaced(self.seen.output, limit) & self.valid
+        known = any(other.additive == drifted and not other.convinced for other in bank.hypotheses)
         if not drifted or (not bank.trusts_model and known):
             return
-        seen = self._run_seen(bank.own, drifted)
+        seen = self._run_seen(bank.unloaded, drifted)
         if seen.square >= self.tuning["quiet_beside"] + self.tuning["quiet_per_output"] * self.at.p:
             return
         score = self.stay
         if bank.trusts_model:
             score = max(score, self.h.score + seen.likelihood) + 1.0
-        self._put_back("drift", bank.own, drifted, score=score, convinced=bank.trusts_model)
+        self._put_back("drift", bank.unloaded, drifted, score=score, convinced=bank.trusts_model)
 
     # The sensors.
 
@@ -684,12 +684,12 @@ class Proposals:
         if not self.unlikely:
             return
         free = sorted(self.valid - self.h.flagged)
-        price = self.tuning["start_fault"] if self.bank.first else self.price["fault"]
-        kept = {"convinced": self.h.convinced, "misfit": -2.0 * self.price["fault"]}
-        several = self.tuning["several"] * price
+        log_rate = self.tuning["start_fault"] if self.bank.first else self.log_rate["fault"]
+        kept = {"convinced": self.h.convinced, "misfit": -2.0 * self.log_rate["fault"]}
+        several = self.tuning["several"] * log_rate
         for q in free:
-            self._add("bias", price, self._biased(frozenset({q})), **kept)
-            self._add("scale", price, self._rescaled(q), **kept)
+            self._add("bias", log_rate, self._biased(frozenset({q})), **kept)
+            self._add("scale", log_rate, self._rescaled(q), **kept)
             if 2 < self.at.p <= 4:
                 for other in (other for other in free if other < q):
                     self._add("bias", several, self._biased(frozenset({q, other})), **kept)
@@ -700,27 +700,27 @@ class Proposals:
         h, bank = self.h, self.bank
         known = h.flagged & self.valid
         for q in range(self.at.p):
-            may_freeze = q in self.valid and q not in h.stuck and h is bank.live[0]
+            may_freeze = q in self.valid and q not in h.stuck and h is bank.hypotheses[0]
             if may_freeze and bank.repeats.evidence[q] > self.tuning["frozen_evidence"]:
-                price = self.price["stuck"] + bank.repeats.before[q]
-                begins = -2.0 * self.price["fault"]
-                self._add("freeze", price, self._frozen(q), convinced=h.convinced, misfit=begins)
+                log_rate = self.log_rate["stuck"] + bank.repeats.before[q]
+                begins = -2.0 * self.log_rate["fault"]
+                self._add("freeze", log_rate, self._frozen(q), convinced=h.convinced, misfit=begins)
             if q not in known:
                 continue
             if self.unlikely:
-                price = self.price["change"]
-                again = -2.0 * price
-                self._add("change", price, self._biased(frozenset({q})), convinced=h.convinced, misfit=again)
-            self._release(frozenset({q}), self.price["release"], convinced=h.convinced or len(h.flagged) == 1)
+                log_rate = self.log_rate["change"]
+                again = -2.0 * log_rate
+                self._add("change", log_rate, self._biased(frozenset({q})), convinced=h.convinced, misfit=again)
+            self._release(frozenset({q}), self.log_rate["release"], convinced=h.convinced or len(h.flagged) == 1)
         if len(known) > 1:
-            self._release(h.flagged, self.tuning["several"] * self.price["release"], convinced=True)
+            self._release(h.flagged, self.tuning["several"] * self.log_rate["release"], convinced=True)
 
-    def _release(self, sensors: frozenset[int], price: float, *, convinced: bool) -> None:
+    def _release(self, sensors: frozenset[int], log_rate: float, *, convinced: bool) -> None:
         """The recovery of these sensors, unless what it leaves is there already."""
         trial = self._try(self._released(sensors))
-        score = self.h.score + price + trial.seen.likelihood
+        score = self.h.score + log_rate + trial.seen.likelihood
         left = self.h.flagged - sensors
-        for other in self.bank.live:
+        for other in self.bank.hypotheses:
             seen = self.bank.seen[id(other)]
             if (
                 other is not self.h
