@@ -383,11 +383,13 @@ mod tests {
     #[cfg(unix)]
     fn a_run_that_is_killed_leaves_one_set_once_the_next_has_begun() {
         let root = TempDir::new().unwrap();
+        let (_, module) = module_path!().split_once("::").unwrap();
+        let writer = format!("{module}::writes_until_it_is_killed");
         let mut last = -1;
         for round in 0..40_u64 {
             let before = generations(root.path());
             let mut run = std::process::Command::new(std::env::current_exe().unwrap())
-                .args(["--exact", "output::tests::writes_until_it_is_killed"])
+                .args(["--exact", &writer])
                 .env("FTC_OUTPUT_TO_BE_KILLED", root.path())
                 .stdout(std::process::Stdio::null())
                 .spawn()
