@@ -121,7 +121,7 @@ fn the_papers_claims_are_put_to_the_test() {
     near(&window["after"], 0.283, 5e-4);
     near(&window["full"], 0.0, 1e-9);
     near(&claims["largest_variance"], 0.174, 5e-4);
-    near(&claims["doubled_disturbance"]["sound"], 2.1146, 1e-3);
+    near(&claims["doubled_disturbance"]["corrected"], 2.1146, 1e-3);
     let latency = &claims["latency"];
     assert_eq!(latency["common"], false);
     assert_eq!(latency["switched"], false);
