@@ -233,7 +233,7 @@ class Bank:
         return (
             not head.flagged
             and not head.loose
-            and seen.sound
+            and seen.regular
             and seen.square < self.tuning["quiet_beside"] + self.tuning["quiet_per_output"] * self.at.p
             and bool(np.all(self.repeats.evidence < self.tuning["frozen_evidence"]))
             and not self.first
@@ -379,7 +379,7 @@ class Bank:
     def _learn_noise(self, reading: Reading) -> None:
         """The mean of the noise's square, given the innovations of the sensors in use; the design's is the least."""
         seen = self.seen[id(self.best)]
-        if not seen.sound:
+        if not seen.regular:
             return
         tuning = self.tuning
         self.noise_samples = min(self.noise_samples + 1.0, tuning["noise_memory"])

@@ -185,7 +185,7 @@ class Seen:
     N: np.ndarray = field(default_factory=lambda: np.zeros((0, 0)))
 
     @cached_property
-    def sound(self) -> bool:
+    def regular(self) -> bool:
         """Whether the covariance is positive definite."""
         try:
             np.linalg.cholesky(self.S)
@@ -196,12 +196,12 @@ class Seen:
     @cached_property
     def square(self) -> float:
         """The square of the whitened innovation, r' S^-1 r."""
-        return float(self.r @ np.linalg.solve(self.S, self.r)) if self.sound else 1e300
+        return float(self.r @ np.linalg.solve(self.S, self.r)) if self.regular else 1e300
 
     @cached_property
     def likelihood(self) -> float:
         """Its logarithm, but for a constant."""
-        if not self.sound:
+        if not self.regular:
             return -1e5
         return max(-0.5 * min(self.square, 1e5) - 0.5 * np.linalg.slogdet(self.S)[1], -1e6)
 
@@ -273,7 +273,7 @@ class Hypothesis:
 
     def update(self, seen: Seen) -> None:
         """Takes all readings in at once, in Joseph's form."""
-        if not seen.sound:
+        if not seen.regular:
             return
         K = np.linalg.solve(seen.S, seen.H @ self.P).T
         left = np.eye(len(self.z)) - K @ seen.H
