@@ -221,9 +221,7 @@ impl Estimator {
     pub fn check_memory(&self, inputs: usize) -> Result<(), ControllerError> {
         let window = self.window.saturating_mul(inputs);
         let learned = self.harmonics.as_ref().map_or(0, |known| known.count);
-        let hypotheses = self.hypotheses.as_ref();
-        let period = hypotheses.and_then(|settings| settings.period);
-        let estimated = period.map_or(0, |known| known.harmonics);
+        let estimated = self.hypotheses.as_ref().map_or(0, Hypotheses::harmonics);
         for (field, found, most, rule) in [
             (
                 "estimator.response_length",
@@ -317,7 +315,7 @@ const LARGEST_SHARE: f64 = 1e6;
 fn hypotheses(settings: &Hypotheses, sizes: Sizes) -> Checked {
     let (n, m, p) = (sizes.states, sizes.inputs, sizes.outputs);
     let s = sizes.disturbances;
-    let harmonics = settings.period.map_or(0, |known| known.harmonics);
+    let harmonics = settings.harmonics();
     let period = settings.period.map_or(1.0, |known| known.seconds);
     range(
         period.is_finite() && period > 0.0,

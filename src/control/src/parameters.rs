@@ -503,6 +503,15 @@ impl FittedMode {
 }
 
 impl Hypotheses {
+    /// Harmonics of the disturbance that are estimated.
+    ///
+    /// A call of its own: where it is inlined behind an `Option`, the period is read before it is known to be there, which
+    /// is harmless but what memcheck complains of.
+    #[inline(never)]
+    pub fn harmonics(&self) -> usize {
+        self.period.map_or(0, |known| known.harmonics)
+    }
+
     /// Whether a slow divergence is taken for a sensor's fault.
     pub fn trusts_model(&self) -> bool {
         self.ambiguous == Ambiguous::TrustModel

@@ -127,7 +127,7 @@ fn model(
         .chain((0..m).map(|_| settings.gain_error * settings.gain_error))
         .chain(bias.iter().map(|bias| bias * error * error))
         .collect();
-    let harmonics = harmonics_of(settings);
+    let harmonics = settings.harmonics();
     ModeModel::new(
         layout,
         rows(&mode.a),
@@ -155,11 +155,6 @@ fn as_fitted<'a>(
         }
         mode
     })
-}
-
-/// Harmonics of the disturbance that are estimated.
-fn harmonics_of(settings: &Hypotheses) -> usize {
-    settings.period.map_or(0, |known| known.harmonics)
 }
 
 /// Per pair of the disturbance's `d` states: the error of its angle, and the least growth of its variance.
@@ -200,7 +195,7 @@ impl Bank {
             (mode.a.nrows(), mode.b.ncols(), mode.c.nrows())
         });
         let disturbances = settings.disturbance_load.len();
-        let d = 2 * harmonics_of(settings) * disturbances;
+        let d = 2 * settings.harmonics() * disturbances;
         let layout = Layout {
             n,
             m,
