@@ -19,9 +19,9 @@ pub struct Asked {
     /// The design file that will hold the text; its name names the design, its folder is where the
     /// logs are named from.
     pub out: PathBuf,
-    /// Columns of the inputs; where empty u[1], u[2] and so on.
+    /// Columns of the inputs; where empty `u[1]`, `u[2]` and so on.
     pub inputs: Vec<String>,
-    /// Columns of the outputs; where empty y[1], y[2] and so on.
+    /// Columns of the outputs; where empty `y[1]`, `y[2]` and so on.
     pub outputs: Vec<String>,
     /// Column of the time, where it is called neither t nor time.
     pub time: Option<String>,
