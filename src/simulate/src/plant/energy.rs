@@ -28,10 +28,10 @@ const GAUSS: [(f64, f64); 4] = [
 
 /// A piece of a sample is no longer than this many time constants of the squared currents, for which the
 /// collocation is exact to rounding errors.
-const LONGEST: f64 = 5.0;
+const LONGEST: f64 = 2.5;
 
 /// The most pieces a sample is divided into.
-const MOST_PIECES: f64 = 8.0;
+const MOST_PIECES: f64 = 16.0;
 
 /// Rounds after which the collocation is given up.
 const MOST_ROUNDS: usize = 12;
