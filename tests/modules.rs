@@ -4,6 +4,7 @@
 //! `use` brought in) to what that other defines; what a module only passes on is followed to where it is defined. A
 //! parent that passes on what its descendants define does not need them by that. Unit tests do not count.
 
+use proc_macro2::{Delimiter, Spacing, TokenStream, TokenTree};
 use std::collections::{BTreeMap, BTreeSet};
 use std::fmt::Write;
 use std::fs;
@@ -24,90 +25,43 @@ const CRATES: [(&str, bool); 6] = [
 /// Names from the crate's root on; the root itself is empty.
 type Name = Vec<String>;
 
-/// A word or a mark of Rust's grammar; of strings and characters nothing is kept, `::` is one mark.
+/// A word or a mark of Rust's grammar; of strings, numbers and characters nothing is kept, `::` is one mark.
 type Token = String;
 
-/// Ends of lines in comments and quotations are all that is kept of them.
 fn tokens(text: &str) -> Vec<Token> {
-    let c: Vec<char> = text.chars().collect();
-    let is_word = |c: &char| c.is_alphanumeric() || *c == '_';
-    let starts = |at: usize, mark: &str| {
-        mark.chars()
-            .enumerate()
-            .all(|(i, m)| c.get(at + i) == Some(&m))
-    };
-    let (mut found, mut at) = (Vec::new(), 0);
-    while at < c.len() {
-        if starts(at, "//") {
-            while at < c.len() && c[at] != '\n' {
-                at += 1;
-            }
-        } else if starts(at, "/*") {
-            let mut depth = 0;
-            loop {
-                match () {
-                    () if starts(at, "/*") => (depth, at) = (depth + 1, at + 2),
-                    () if starts(at, "*/") => (depth, at) = (depth - 1, at + 2),
-                    () => at += 1,
-                }
-                if depth == 0 || at >= c.len() {
-                    break;
-                }
-            }
-        } else if let Some(end) = raw_string(&c, at) {
-            at = end;
-        } else if c[at] == '"' {
-            at += 1;
-            while at < c.len() && c[at] != '"' {
-                at += if c[at] == '\\' { 2 } else { 1 };
-            }
-            at += 1;
-        } else if c[at] == '\'' && (c.get(at + 1) == Some(&'\\') || c.get(at + 2) == Some(&'\'')) {
-            at += if c[at + 1] == '\\' { 3 } else { 2 };
-            while at < c.len() && c[at] != '\'' {
-                at += 1;
-            }
-            at += 1;
-        } else if is_word(&c[at]) {
-            let end = c[at..]
-                .iter()
-                .position(|c| !is_word(c))
-                .map_or(c.len(), |n| at + n);
-            found.push(c[at..end].iter().collect());
-            at = end;
-        } else if starts(at, "::") {
-            found.push("::".into());
-            at += 2;
-        } else {
-            if !c[at].is_whitespace() {
-                found.push(c[at].to_string());
-            }
-            at += 1;
-        }
-    }
+    let stream: TokenStream = text.parse().expect("the compiler takes it");
+    let mut found = Vec::new();
+    flatten(stream, &mut found);
     found
 }
 
-/// The end of a raw string that begins here.
-fn raw_string(c: &[char], at: usize) -> Option<usize> {
-    let before = at.checked_sub(1).map(|before| c[before]);
-    if before.is_some_and(|c| c.is_alphanumeric() || c == '_') {
-        return None;
+fn flatten(stream: TokenStream, found: &mut Vec<Token>) {
+    let mut trees = stream.into_iter().peekable();
+    while let Some(tree) = trees.next() {
+        match tree {
+            TokenTree::Group(group) => {
+                let (open, close) = match group.delimiter() {
+                    Delimiter::Brace => ("{", "}"),
+                    Delimiter::Bracket => ("[", "]"),
+                    Delimiter::Parenthesis => ("(", ")"),
+                    Delimiter::None => ("", ""),
+                };
+                found.push(open.into());
+                flatten(group.stream(), found);
+                found.push(close.into());
+            }
+            TokenTree::Ident(word) => found.push(word.to_string()),
+            TokenTree::Punct(mark) => {
+                let colon = |tree: &TokenTree| matches!(tree, TokenTree::Punct(mark) if mark.as_char() == ':');
+                let joined = mark.as_char() == ':' && mark.spacing() == Spacing::Joint;
+                match joined && trees.next_if(colon).is_some() {
+                    true => found.push("::".into()),
+                    false => found.push(mark.as_char().into()),
+                }
+            }
+            TokenTree::Literal(_) => {}
+        }
     }
-    let quoted = at + usize::from(c[at] == 'b') + 1;
-    if c.get(quoted - 1) != Some(&'r') {
-        return None;
-    }
-    let hashes = c[quoted..].iter().take_while(|&&c| c == '#').count();
-    if c.get(quoted + hashes) != Some(&'"') {
-        return None;
-    }
-    let rest = &c[quoted + hashes + 1..];
-    let ends = |at: &usize| {
-        rest[*at] == '"' && rest[at + 1..].iter().take_while(|&&c| c == '#').count() >= hashes
-    };
-    let end = (0..rest.len()).find(ends).unwrap_or(rest.len());
-    Some(quoted + hashes + 1 + end + 1 + hashes)
 }
 
 /// The end of a group whose opening mark stands at `at`.
