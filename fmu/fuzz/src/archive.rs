@@ -18,7 +18,7 @@ pub enum Damage {
     Archive(Vec<Entry>, Vec<Patch>, Option<u16>),
 }
 
-/// An entry, beside those of a intact FMU.
+/// An entry, beside those of an intact FMU.
 #[derive(Arbitrary, Clone, Debug)]
 pub struct Entry {
     /// One of the intact names, or the next field.

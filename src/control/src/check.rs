@@ -316,9 +316,9 @@ fn hypotheses(settings: &Hypotheses, sizes: Sizes) -> Checked {
     let (n, m, p) = (sizes.states, sizes.inputs, sizes.outputs);
     let s = sizes.disturbances;
     let harmonics = settings.harmonics();
-    let period = settings.period.map_or(1.0, |known| known.seconds);
+    let positive = |seconds: f64| seconds.is_finite() && seconds > 0.0;
     range(
-        period.is_finite() && period > 0.0,
+        settings.period.is_none_or(|known| positive(known.seconds)),
         "estimator.hypotheses.period.seconds",
         "must be a positive number of seconds",
     )?;

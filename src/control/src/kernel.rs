@@ -55,18 +55,23 @@ fn add_few<const ROWS: usize>(out: &mut [f64], matrix: &Matrix, vector: &[f64]) 
         return;
     };
     let mut sums = *out;
+    add_columns(&mut sums, matrix, vector);
+    *out = sums;
+}
+
+/// `sums += matrix * vector` for a matrix of `ROWS` rows.
+#[inline]
+fn add_columns<const ROWS: usize>(sums: &mut [f64; ROWS], matrix: &Matrix, vector: &[f64]) {
     for (column, factor) in matrix.as_slice().as_chunks::<ROWS>().0.iter().zip(vector) {
         for (sum, value) in sums.iter_mut().zip(column) {
             *sum += factor * value;
         }
     }
-    *out = sums;
 }
 
 /// `out = start + matrix * vector`.
 pub fn affine(out: &mut [f64], start: &[f64], matrix: &Matrix, vector: &[f64]) {
-    copy(out, start);
-    add_product(out, matrix, vector);
+    affine_sum(out, start, [(matrix, vector)]);
 }
 
 /// `out = start + matrix_1 * vector_1 + matrix_2 * vector_2 + ...`, summed in this order.
@@ -99,13 +104,8 @@ fn affine_few<const ROWS: usize, const K: usize>(
     };
     let mut sums = *start;
     for (matrix, vector) in terms {
-        if matrix.nrows() != ROWS {
-            continue;
-        }
-        for (column, factor) in matrix.as_slice().as_chunks::<ROWS>().0.iter().zip(vector) {
-            for (sum, value) in sums.iter_mut().zip(column) {
-                *sum += factor * value;
-            }
+        if matrix.nrows() == ROWS {
+            add_columns(&mut sums, matrix, vector);
         }
     }
     *out = sums;
@@ -236,7 +236,8 @@ mod tests {
             let (left, right) = x.split_at(3);
             let (mut found, mut wanted) = (vec![7.0; rows], vec![7.0; rows]);
             affine_sum(&mut found, &start, [(&first, left), (&second, right)]);
-            affine(&mut wanted, &start, &first, left);
+            copy(&mut wanted, &start);
+            add_product(&mut wanted, &first, left);
             add_product(&mut wanted, &second, right);
             prop_assert_eq!(found, wanted);
         }

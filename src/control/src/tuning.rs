@@ -218,6 +218,12 @@ impl Tuning {
 }
 
 impl BankTuning {
+    /// The running mean of a misfit after a sample with this squared whitened innovation, which counts up to
+    /// [`misfit_limit`](Self::misfit_limit), and `penalty` beside it.
+    pub(crate) fn averaged(&self, misfit: f64, square: f64, penalty: f64) -> f64 {
+        misfit + self.misfit_share * (square.min(self.misfit_limit) + penalty - misfit)
+    }
+
     /// [`quiet_per_output`](Self::quiet_per_output) and beside, for `outputs` sensors.
     pub(crate) fn quiet(&self, outputs: usize) -> f64 {
         self.quiet_beside + self.quiet_per_output * outputs as f64

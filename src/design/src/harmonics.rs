@@ -36,11 +36,15 @@ impl KnownDisturbance {
 
     /// Angle per sample (radians) of each harmonic, for [`ControlSpec::resonators`](crate::ControlSpec::resonators).
     pub fn angles(&self, sample_time: f64) -> Vec<f64> {
-        let period = KnownPeriod {
+        self.known_period().angles(sample_time).collect()
+    }
+
+    /// What the estimator is told of it.
+    pub(crate) fn known_period(&self) -> KnownPeriod {
+        KnownPeriod {
             seconds: self.period,
             harmonics: self.harmonics,
-        };
-        period.angles(sample_time).collect()
+        }
     }
 }
 

@@ -2,7 +2,7 @@
 
 use crate::harmonics::KnownDisturbance;
 use crate::{Signal, Signals};
-use ftc_control::parameters::{Ambiguous, Hypotheses, KnownPeriod};
+use ftc_control::parameters::{Ambiguous, Hypotheses};
 use ftc_plant::{Mode, Scenario, SwitchedPlant};
 
 /// What may be asked of the state-based estimator; the rest follows from the design.
@@ -104,10 +104,7 @@ impl HypothesesSpec {
             .and_then(|known| known.amplitude.clone())
             .filter(|sizes| sizes.iter().all(|&size| size > 0.0));
         let disturbance = amplitude.unwrap_or_else(|| unknown_disturbance(plant, &scaling.outputs));
-        let period = known.map(|known| KnownPeriod {
-            seconds: known.period,
-            harmonics: known.harmonics,
-        });
+        let period = known.map(KnownDisturbance::known_period);
         let harmonics = period.map_or(0, |known| known.harmonics);
         let waves = disturbance
             .iter()

@@ -203,8 +203,8 @@ impl Bank {
             | Action::Drift(_) => -2.0 * self.log_rates.fault,
             Action::Change(_) => -2.0 * self.log_rates.change,
         };
-        let square = state.seen[slot].square.min(self.tuning.misfit_limit);
-        h.misfit += self.tuning.misfit_share * (square + penalty - h.misfit);
+        let square = state.seen[slot].square;
+        h.misfit = self.tuning.averaged(h.misfit, square, penalty);
         h.convinced = candidate.convinced;
     }
 

@@ -13,13 +13,13 @@ pub(super) struct Expectation {
     /// Outputs (p).
     pub(super) output: Vec<f64>,
     /// Entries of the faults (p).
-    pub(super) fault: Vec<f64>,
+    fault: Vec<f64>,
     /// Covariance of the outputs, `C P C'` (p x p).
-    pub(super) outputs: Vec<f64>,
+    outputs: Vec<f64>,
     /// Covariance of outputs and faults (p x p).
-    pub(super) crossed: Vec<f64>,
+    crossed: Vec<f64>,
     /// Covariance of the faults (p x p).
-    pub(super) faults: Vec<f64>,
+    faults: Vec<f64>,
     /// Whether it has yet to be taken from the hypothesis at hand.
     pub(super) stale: bool,
 }

@@ -416,8 +416,8 @@ impl Bank {
                 state.seen[state.best].r[q]
             };
         }
-        let square = state.seen[state.best].square.min(self.tuning.misfit_limit);
-        state.misfit += self.tuning.misfit_share * (square - state.misfit);
+        let square = state.seen[state.best].square;
+        state.misfit = self.tuning.averaged(state.misfit, square, 0.0);
         state.model_valid = state.misfit < self.tuning.misfit_invalid * p as f64 && !h.loose;
         self.find_load(state, model);
         state.actuator_fault = 0;

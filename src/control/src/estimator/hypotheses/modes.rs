@@ -86,7 +86,7 @@ impl Bank {
         })
     }
 
-    /// Nothing happened to every hypothesis in competition.
+    /// Nothing happened: every hypothesis in competition stays what it is.
     pub(super) fn continue_all(&self, state: &mut BankState) {
         let (p, head) = (self.layout.p, state.in_use.first());
         let likelihood = |seen: &Innovation| match state.in_use.count {
@@ -98,8 +98,7 @@ impl Bank {
             let (h, seen) = (&mut state.slots[slot], &mut state.seen[slot]);
             h.score += likelihood(seen) - lead;
             h.update(self.layout, seen, self.output_error());
-            let square = seen.square.min(self.tuning.misfit_limit);
-            h.misfit += self.tuning.misfit_share * (square - h.misfit);
+            h.misfit = self.tuning.averaged(h.misfit, seen.square, 0.0);
         }
         state.slots[head].score = 0.0;
         state.best = head;

@@ -187,10 +187,8 @@ impl Bank {
         tuning: BankTuning,
         thresholds: &[f64],
     ) -> Self {
-        let angles: Vec<f64> = match settings.period {
-            Some(known) => known.angles(sample_time).collect(),
-            None => Vec::new(),
-        };
+        let period = settings.period.iter();
+        let angles: Vec<f64> = period.flat_map(|known| known.angles(sample_time)).collect();
         let (n, m, p) = modes.first().map_or((0, 0, 0), |mode| {
             (mode.a.nrows(), mode.b.ncols(), mode.c.nrows())
         });
