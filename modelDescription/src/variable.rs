@@ -16,6 +16,17 @@ pub enum Causality {
     Output,
 }
 
+impl Causality {
+    /// As FMI 2.0 writes it.
+    pub fn word(self) -> &'static str {
+        match self {
+            Self::Parameter => "parameter",
+            Self::Input => "input",
+            Self::Output => "output",
+        }
+    }
+}
+
 /// When a variable may change (FMI 2.0, section 2.2.7).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Variability {

@@ -4,7 +4,7 @@
 //! is a constant, so that the same design always gives the same FMU.
 
 use crate::units::{BASE, display_factor, meaning};
-use crate::{Causality, Initial, Kind, LOG_CATEGORIES, Variability, Variable, VariableTable};
+use crate::{Initial, Kind, LOG_CATEGORIES, Variability, Variable, VariableTable};
 use quick_xml::Writer;
 use quick_xml::events::{BytesDecl, Event};
 use std::collections::BTreeMap;
@@ -235,7 +235,7 @@ fn write_variable(
         ("name", variable.name.clone()),
         ("valueReference", reference.to_string()),
         ("description", variable.description.clone()),
-        ("causality", causality(variable.causality).into()),
+        ("causality", variable.causality.word().into()),
         ("variability", variability(variable.variability).into()),
     ];
     let initial = variable.initial();
@@ -316,14 +316,6 @@ fn write_structure(writer: &mut Writer<Vec<u8>>, table: &VariableTable) -> io::R
             &variable.initial_dependencies
         })
     })
-}
-
-fn causality(causality: Causality) -> &'static str {
-    match causality {
-        Causality::Parameter => "parameter",
-        Causality::Input => "input",
-        Causality::Output => "output",
-    }
 }
 
 fn variability(variability: Variability) -> &'static str {

@@ -685,7 +685,7 @@ impl<S: Slave> Component<S> {
         Err(Failure::error(format!(
             "{} is no {}: derivatives are of outputs by inputs",
             self.name(reference),
-            format!("{causality:?}").to_lowercase()
+            causality.word()
         )))
     }
 

@@ -3,7 +3,7 @@
 use crate::clock::{Clock, Event};
 use crate::life_cycle::State;
 use crate::{Slave, Values};
-use postcard::ser_flavors;
+use postcard::ser_flavors::Flavor;
 use serde::{Deserialize, Serialize, de::DeserializeOwned};
 
 /// Marks serialised states, with the version of their layout.
@@ -84,6 +84,36 @@ impl<T: Clone> Clone for Snapshot<T> {
     }
 }
 
+/// Bytes that are counted and, where there is room, written: one type for both, so that a binary holds
+/// the code that serialises a state once.
+struct Content<'a> {
+    room: Option<&'a mut [u8]>,
+    length: usize,
+}
+
+impl Flavor for Content<'_> {
+    type Output = usize;
+
+    fn try_push(&mut self, byte: u8) -> postcard::Result<()> {
+        self.try_extend(&[byte])
+    }
+
+    fn try_extend(&mut self, bytes: &[u8]) -> postcard::Result<()> {
+        let end = self.length + bytes.len();
+        if let Some(room) = &mut self.room {
+            let free = room.get_mut(self.length..end);
+            free.ok_or(postcard::Error::SerializeBufferFull)?
+                .copy_from_slice(bytes);
+        }
+        self.length = end;
+        Ok(())
+    }
+
+    fn finalize(self) -> postcard::Result<usize> {
+        Ok(self.length)
+    }
+}
+
 impl<T> Snapshot<T> {
     /// What comes next in time; none before the first step can be made.
     pub fn upcoming(&self) -> Option<Event> {
@@ -120,7 +150,7 @@ impl<T> Snapshot<T> {
             return Err(StateError::NoRoom);
         };
         mark.copy_from_slice(&MARK);
-        postcard::to_slice(&(guid, self), content).map_err(StateError::NotSerialised)?;
+        self.write_content(guid, Some(content))?;
         checksum.copy_from_slice(&crc32fast::hash(body).to_le_bytes());
         Ok(())
     }
@@ -133,9 +163,16 @@ impl<T> Snapshot<T> {
     where
         T: Serialize,
     {
-        let content = ser_flavors::Size::default();
-        let size = postcard::serialize_with_flavor(&(guid, self), content);
-        Ok(MARK.len() + size.map_err(StateError::NotSerialised)? + CHECKSUM)
+        Ok(MARK.len() + self.write_content(guid, None)? + CHECKSUM)
+    }
+
+    /// Writes what stands between mark and checksum, where there is `room` for it, and returns its length.
+    fn write_content(&self, guid: &str, room: Option<&mut [u8]>) -> Result<usize, StateError>
+    where
+        T: Serialize,
+    {
+        let content = Content { room, length: 0 };
+        postcard::serialize_with_flavor(&(guid, self), content).map_err(StateError::NotSerialised)
     }
 
     /// Reads what [`Snapshot::write_bytes`] wrote.
