@@ -8,10 +8,10 @@
 
 use crate::augmented::scaled;
 use crate::commissioning::{Database, RecordedDisturbance};
-use crate::matrices::plain;
 use ftc_control::parameters::FittedMode;
 use ftc_plant::Mode;
 use ftc_plant::scaling::Scaling;
+use ftc_record::plain;
 use nalgebra::{DMatrix, DVector};
 
 /// Samples in a window, at least, and per unknown of its own.
@@ -462,7 +462,7 @@ mod tests {
             let still = DMatrix::identity(2, 2) - a;
             (&plant.c * still.lu().solve(b).unwrap())[(0, 0)]
         };
-        let dense = crate::matrices::dense;
+        let dense = ftc_record::dense;
         let truth = gain(&plant.a, &plant.b);
         (gain(&dense(&fitted.a), &dense(&fitted.b)) - truth).abs()
             / (gain(&model.a, &model.b) - truth).abs()
@@ -509,7 +509,7 @@ mod tests {
         let model = mode();
         let log = commission(&model, &[0.0], &[0.01], 400, 4);
         let found = fit(&model, &[log], None, 0.05, &scaling()).unwrap();
-        let a = crate::matrices::dense(&found.mode.a);
+        let a = ftc_record::dense(&found.mode.a);
         assert!((&a - &model.a).amax() < 0.02, "{a}");
         assert!(found.model_error > 0.02, "{found:?}");
     }

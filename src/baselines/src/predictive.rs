@@ -14,13 +14,13 @@
 //! reference, and `P` solves the Riccati equation. With the states eliminated the programme differs
 //! from sample to sample in its linear term alone, so it is prepared once per mode.
 
-use crate::closed_loop::{Regulator, Report};
-use crate::plant::PlantState;
 use clarabel::algebra::CscMatrix;
 use clarabel::solver::{DefaultSettings, DefaultSolver, IPSolver, SupportedConeT};
 use ftc_control::parameters::Limits;
 use ftc_design::riccati;
 use ftc_plant::{Mode, SwitchedPlant};
+use ftc_simulate::closed_loop::{Regulator, Report};
+use ftc_simulate::plant::PlantState;
 use nalgebra::{DMatrix, DVector};
 use std::ops::AddAssign;
 
@@ -217,13 +217,12 @@ impl Regulator for Predictive {
     }
 
     fn report(&self) -> Report<'_> {
-        Report {
-            estimate: self.estimate.as_slice(),
-            fault: &self.no_fault,
-            residual: self.offset.as_slice(),
-            flagged: &self.no_flag,
-            mode: None,
-        }
+        Report::new(
+            self.estimate.as_slice(),
+            &self.no_fault,
+            self.offset.as_slice(),
+            &self.no_flag,
+        )
     }
 
     fn advance(&mut self, seen: &PlantState, acting: &[f64]) {
