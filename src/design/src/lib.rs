@@ -60,6 +60,8 @@ mod parallel;
 mod proof;
 #[cfg(feature = "solver")]
 mod pseudo_inverse;
+#[cfg(feature = "solver")]
+pub mod quadratic;
 mod request;
 pub mod riccati;
 pub mod running_loop;
