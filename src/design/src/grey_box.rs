@@ -829,10 +829,13 @@ impl GreyBox<'_> {
             for (pair, mode) in rests.windows(2).zip(window.modes.windows(2)) {
                 let [one, next] = [mode[0], mode[1]];
                 if one == next {
-                    for q in 0..p {
-                        sums[one].0[q] +=
-                            ((pair[1][q] - pair[0][q]) * self.deviation[one][q]).powi(2);
-                    }
+                    let steps = pair[0]
+                        .iter()
+                        .zip(pair[1])
+                        .map(|(before, after)| after - before);
+                    let steps =
+                        DVector::from_iterator(p, steps).component_mul(&self.deviation[one]);
+                    sums[one].0 += steps.component_mul(&steps);
                     sums[one].1 += 2.0;
                 }
             }
@@ -1029,6 +1032,8 @@ mod tests {
 
     /// Gains of sensors and what the disturbance moves are found, in coordinates that the modes share: judged on a
     /// log that was not fitted, with switches within its windows.
+    ///
+    /// promise: fitted-model
     #[test]
     fn wrong_output_and_disturbance_matrices_are_corrected() {
         let plant = switching();

@@ -715,7 +715,7 @@ fn the_state_based_estimator_fits_its_model_to_the_log() {
 fn fs_refused_method(pair: &[(&str, &str)]) {
     let bench = bench(PAIR, pair);
     let design = fs::read_to_string(bench.path(FILE)).unwrap();
-    let sliding = design.replace("model_error = 0.05", "method = \"sliding\"");
+    let sliding = design.replace("method = \"reference\"", "method = \"sliding\"");
     fs::write(bench.path(FILE), sliding).unwrap();
     let run = bench.run(&["design", FILE]);
     assert_eq!(run.code(), 2, "{}", run.stdout());
