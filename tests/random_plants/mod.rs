@@ -67,46 +67,51 @@ pub fn with_several_sensors(random: &mut RandomNumbers) -> Design {
 /// The same with an estimator of one's choice.
 pub fn design_with(random: &mut RandomNumbers, method: EstimatorMethod) -> Design {
     loop {
-        let (n, m, p) = (random.count(1, 5), random.count(1, 3), random.count(1, 3));
-        let output = random.matrix(p, n);
-        let plant = SwitchedPlant::new(
-            random.between(0.01, 1.0),
-            (0..2).map(|_| mode(random, n, m, p, &output)).collect(),
-        );
-        let dims = plant.dimensions();
-        let r = p.min(m).min(n);
-        let mut control = ControlSpec::unweighted(dims);
-        control.tracked = (0..r).collect();
-        control.lyapunov = Lyapunov::Dwell;
-        control.decay = 0.95;
-        control.output_weight = vec![1.0; r];
-        control.integral_weight = vec![0.3 / plant.sample_time; r];
-        control.input_weight = vec![0.3; m];
-        let period = random.between(40.0, 300.0) * plant.sample_time;
-        let seed = random.0.next_u64();
-        let reference = (0..r).map(|_| Waveform::Square {
-            amplitude: random.between(0.2, 0.8),
-            period: 400.0 * plant.sample_time,
-            offset: 0.0,
-        });
-        let mut scenario = Scenario::new(STEPS, reference.collect(), dims);
-        scenario.noise = vec![NOISE; p];
-        scenario.seed = seed;
-        scenario.disturbance = vec![Waveform::Sine {
-            amplitude: 0.05,
-            period,
-            phase: 0.0,
-            offset: 0.0,
-        }];
-        let mut request = Request::new("random", plant, Signals::numbered(dims), scenario);
-        request.control = control;
-        request.observer = ObserverSpec::new(ObserverChoice::Auto, 0.9, Lyapunov::Dwell);
-        request.estimator.method = method;
-        let mut disturbance = KnownDisturbance::new(period);
-        disturbance.amplitude = Some(vec![0.05]);
-        request.estimator.disturbance = Some(disturbance);
-        if let Ok(design) = assemble(request) {
+        if let Ok(design) = assemble(request_with(random, method)) {
             return design;
         }
     }
+}
+
+/// What is asked for a random plant; there may be no such design.
+pub fn request_with(random: &mut RandomNumbers, method: EstimatorMethod) -> Request {
+    let (n, m, p) = (random.count(1, 5), random.count(1, 3), random.count(1, 3));
+    let output = random.matrix(p, n);
+    let plant = SwitchedPlant::new(
+        random.between(0.01, 1.0),
+        (0..2).map(|_| mode(random, n, m, p, &output)).collect(),
+    );
+    let dims = plant.dimensions();
+    let r = p.min(m).min(n);
+    let mut control = ControlSpec::unweighted(dims);
+    control.tracked = (0..r).collect();
+    control.lyapunov = Lyapunov::Dwell;
+    control.decay = 0.95;
+    control.output_weight = vec![1.0; r];
+    control.integral_weight = vec![0.3 / plant.sample_time; r];
+    control.input_weight = vec![0.3; m];
+    let period = random.between(40.0, 300.0) * plant.sample_time;
+    let seed = random.0.next_u64();
+    let reference = (0..r).map(|_| Waveform::Square {
+        amplitude: random.between(0.2, 0.8),
+        period: 400.0 * plant.sample_time,
+        offset: 0.0,
+    });
+    let mut scenario = Scenario::new(STEPS, reference.collect(), dims);
+    scenario.noise = vec![NOISE; p];
+    scenario.seed = seed;
+    scenario.disturbance = vec![Waveform::Sine {
+        amplitude: 0.05,
+        period,
+        phase: 0.0,
+        offset: 0.0,
+    }];
+    let mut request = Request::new("random", plant, Signals::numbered(dims), scenario);
+    request.control = control;
+    request.observer = ObserverSpec::new(ObserverChoice::Auto, 0.9, Lyapunov::Dwell);
+    request.estimator.method = method;
+    let mut disturbance = KnownDisturbance::new(period);
+    disturbance.amplitude = Some(vec![0.05]);
+    request.estimator.disturbance = Some(disturbance);
+    request
 }

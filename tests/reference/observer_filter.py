@@ -81,10 +81,11 @@ class Plant:
 
     def __init__(self, mode: record.Mode, settings: dict, sample_time: float, fitted: dict | None) -> None:
         """Forms matrices and sizes from the design and, where there are logs, from what they say."""
-        self.A, self.B = (np.array(fitted[key]) for key in "ab") if fitted else (mode.A, mode.B)
-        self.C, self.x0, self.u0 = mode.C, mode.x0, mode.u0
+        own = (mode.A, mode.B, mode.C, mode.E, mode.F)
+        self.A, self.B, self.C, E, F = (np.array(fitted[key]) for key in "abcef") if fitted else own
+        self.x0, self.u0 = mode.x0, mode.u0
         n, m, p = len(self.A), self.B.shape[1], len(self.C)
-        E, F = mode.E.reshape(n, -1), mode.F.reshape(p, -1)
+        E, F = E.reshape(n, -1), F.reshape(p, -1)
         s = len(settings["disturbance_load"])
         period = settings.get("period") or {"seconds": 1.0, "harmonics": 0}
         turn = 2 * math.pi * sample_time / period["seconds"]

@@ -359,6 +359,9 @@ fn hypotheses(settings: &Hypotheses, sizes: Sizes) -> Checked {
         let field = |name: &str| format!("estimator.hypotheses.fitted[{index}].{name}");
         shape(field("a"), &fitted.a, (n, n))?;
         shape(field("b"), &fitted.b, (n, m))?;
+        shape(field("c"), &fitted.c, (p, n))?;
+        shape(field("e"), &fitted.e, (n, s))?;
+        shape(field("f"), &fitted.f, (p, s))?;
     }
     range(
         settings.mode_rate.is_none() || sizes.modes <= MOST_MODES,

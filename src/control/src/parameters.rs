@@ -483,6 +483,12 @@ pub struct FittedMode {
     pub a: Matrix,
     /// `B` (n x m).
     pub b: Matrix,
+    /// `C` (p x n).
+    pub c: Matrix,
+    /// `E` (n x s).
+    pub e: Matrix,
+    /// `F` (p x s).
+    pub f: Matrix,
     /// How much of what each output (p) did in the part of the log held back they explain, in percent.
     pub fit: Vec<f64>,
     /// The same of the plant's own matrices.
@@ -490,12 +496,15 @@ pub struct FittedMode {
 }
 
 impl FittedMode {
-    /// These matrices, and how much of the log held back they (`fit`) and the plant's own (`fit_of_model`)
-    /// explain, in percent per output.
-    pub fn new(a: Matrix, b: Matrix, fit: Vec<f64>, fit_of_model: Vec<f64>) -> Self {
+    /// `A`, `B`, `C`, `E` and `F`, and how much of the log held back they (`fit`) and the plant's own
+    /// (`fit_of_model`) explain, in percent per output.
+    pub fn new([a, b, c, e, f]: [Matrix; 5], fit: Vec<f64>, fit_of_model: Vec<f64>) -> Self {
         Self {
             a,
             b,
+            c,
+            e,
+            f,
             fit,
             fit_of_model,
         }

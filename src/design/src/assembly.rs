@@ -288,7 +288,14 @@ fn estimator(request: &Request, dims: Dimensions) -> Result<Estimator, RequestEr
     });
     let hypotheses = state_based.then(|| {
         let known = spec.disturbance.as_ref();
-        let noise = sensor_noise(&request.scenario.noise, &thresholds);
+        // That of the logs, where there are any.
+        let logged = fits.iter().map(|fit| fit.noise.clone());
+        let logged = logged.reduce(|one, other| {
+            let pairs = one.iter().zip(&other);
+            pairs.map(|(one, other)| one.max(*other)).collect()
+        });
+        let noise = logged.as_ref().unwrap_or(&request.scenario.noise);
+        let noise = sensor_noise(noise, &thresholds);
         let (plant, signals) = (&request.plant, &request.signals);
         let reach = hypotheses::reach(plant, &request.control.tracked, &request.scenario);
         let mut settings = spec
@@ -379,19 +386,15 @@ fn fits(request: &Request, logs: &[Vec<Database>]) -> Result<Vec<Fit>, RequestEr
     let scaling = request.signals.scaling();
     let disturbance = recorded_disturbance(request);
     let error = request.estimator.hypotheses.model_error;
-    let modes = request.plant.modes.iter().zip(logs).enumerate();
-    modes
-        .map(|(index, (mode, stretches))| {
-            let found = grey_box::fit(mode, stretches, disturbance, error, &scaling);
-            found.map_err(|unusable| match unusable {
-                Unusable::Short => RequestError::ShortLog {
-                    mode: index + 1,
-                    needed: grey_box::least_samples(mode, disturbance),
-                },
-                Unusable::Late => RequestError::LateLog { mode: index + 1 },
-            })
-        })
-        .collect()
+    let modes = &request.plant.modes;
+    let found = grey_box::fit(modes, logs, disturbance, error, &scaling);
+    found.map_err(|(index, unusable)| match unusable {
+        Unusable::Short => RequestError::ShortLog {
+            mode: index + 1,
+            needed: grey_box::least_samples(&modes[index], disturbance),
+        },
+        Unusable::Late => RequestError::LateLog { mode: index + 1 },
+    })
 }
 
 /// The predictor of a log of one mode (from 1), in which the disturbance was at work.

@@ -290,7 +290,8 @@ fn check_estimator(design: &Design) -> Result<(), CoverageError> {
 }
 
 /// The sizes and rates of the state-based estimator follow from the plant, the signals, and what
-/// the user may choose: model error, fault rate and length, authority, loads, policy, mode length, disturbance.
+/// the user may choose: model error, fault rate and length, authority, loads, policy, mode length, disturbance; what logs say
+/// (matrices, noise) is theirs.
 fn hypotheses_fit(design: &Design) -> bool {
     let estimator = &design.controller.estimator;
     let Some(found) = &estimator.hypotheses else {
@@ -317,8 +318,13 @@ fn hypotheses_fit(design: &Design) -> bool {
     let mut derived = spec.settings(plant, &design.signals, noise, &reach, known.as_ref());
     derived.release_rate = found.release_rate;
     derived.mode_rate = found.mode_rate;
-    derived.fitted.clone_from(&found.fitted);
-    let chosen = (0.0..=1.0).contains(&found.model_error)
+    if !found.fitted.is_empty() {
+        derived.fitted.clone_from(&found.fitted);
+        derived.noise.clone_from(&found.noise);
+    }
+    let positive = |&noise: &f64| noise > 0.0 && noise <= LARGEST;
+    let chosen = found.noise.iter().all(positive)
+        && (0.0..=1.0).contains(&found.model_error)
         && (1e-12..=0.1).contains(&found.fault_rate)
         && (1e-9..=0.5).contains(&found.release_rate)
         && found

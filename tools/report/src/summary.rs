@@ -9,6 +9,7 @@ use ftc_design::augmented::assumes_input_disturbance;
 use ftc_design::running_loop::TransferCertificate;
 use ftc_design::{
     ControlProof, ControlSpec, Design, DesignError, Failure, ObserverProof, StateFeedback,
+    mode_models,
 };
 use serde_json::{Value, json};
 use std::fmt::Write;
@@ -193,19 +194,34 @@ fn found_mode(design: &Design, settings: &Hypotheses) -> Vec<(String, String)> {
     lines
 }
 
-/// What the log says of each mode.
+/// What the log says of each mode: which matrices are not the design's, and how well it fits.
 fn fitted(design: &Design, settings: &Hypotheses) -> Vec<(String, String)> {
     let percents = |values: &[f64]| {
         let values = values.iter().map(|value| format!("{value:.1} %"));
         values.collect::<Vec<_>>().join(", ")
     };
-    let modes = design.plant.modes.iter().zip(&settings.fitted);
+    let models = mode_models(&design.plant);
+    let modes = design.plant.modes.iter().zip(models).zip(&settings.fitted);
     modes
-        .map(|(mode, fitted)| {
-            let (fit, model) = (percents(&fitted.fit), percents(&fitted.fit_of_model));
+        .map(|((mode, model), fitted)| {
+            let (fit, of_model) = (percents(&fitted.fit), percents(&fitted.fit_of_model));
+            let changed: Vec<&str> = [
+                ("A", model.a != fitted.a),
+                ("B", model.b != fitted.b),
+                ("C", model.c != fitted.c),
+                ("E", model.e != fitted.e),
+                ("F", model.f != fitted.f),
+            ]
+            .into_iter()
+            .filter_map(|(name, changed)| changed.then_some(name))
+            .collect();
+            let what = match changed.is_empty() {
+                true => "the design model is kept".to_string(),
+                false => format!("{} fitted; the design model {of_model}", changed.join(", ")),
+            };
             line(
                 format!("fit in mode {}", mode.name),
-                format!("{fit} of the outputs on data held back; the design model {model}"),
+                format!("{fit} of the outputs on data held back, {what}"),
             )
         })
         .collect()
@@ -235,6 +251,12 @@ fn estimator(design: &Design) -> Vec<(String, String)> {
             format!("{error} % of each entry, {source}"),
         ));
         lines.extend(fitted(design, settings));
+        if !settings.fitted.is_empty() {
+            lines.push(line(
+                "noise in the log",
+                with_units(&settings.noise, outputs, 3),
+            ));
+        }
         lines.push(line(
             "fault rate",
             format!("{:e} a sample and sensor", settings.fault_rate),

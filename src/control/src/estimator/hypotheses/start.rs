@@ -152,6 +152,9 @@ fn as_fitted<'a>(
         if let Some(fitted) = settings.fitted.get(at) {
             mode.a.clone_from(&fitted.a);
             mode.b.clone_from(&fitted.b);
+            mode.c.clone_from(&fitted.c);
+            mode.e.clone_from(&fitted.e);
+            mode.f.clone_from(&fitted.f);
         }
         mode
     })
