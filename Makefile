@@ -16,13 +16,17 @@ TOOLS := $(CURDIR)/target/tools
 # No path of this machine in what is built; the same flags everywhere, so that nothing is compiled twice.
 export CARGO_ENCODED_RUSTFLAGS := $(shell tools/platforms/remap.sh)
 
-# The program, and the FMU binaries by themselves: built with the whole workspace they would carry the
-# solver's symbols along. PROGRAM may say more than the program alone, as `.ci/run` does.
-PROGRAM ?= --package ftc-fmu
+# The program and the FMU binaries, in one build: they share their crates. PROGRAM says another build of the
+# program, as `.ci/run` does; the FMU binaries are then built by themselves, without what tests ask for.
+FMUS := --package ftc-controller-fmu --package ftc-plant-fmu
 
 build:
+ifdef PROGRAM
 	cargo build --release $(PROGRAM)
-	cargo build --release --config tools/platforms/fmu.toml --package ftc-controller-fmu --package ftc-plant-fmu
+	cargo build --release $(FMUS)
+else
+	cargo build --release --package ftc-fmu $(FMUS)
+endif
 	tools/platforms/native.sh
 
 # What `make fmu-all` builds, and which FMU binaries the wheel carries (docs/platforms.md).
@@ -143,7 +147,7 @@ lint: $(VENV)/ready
 	$(PYTHON) tests/named.py
 
 # Each library crate as it would be published, built from its archive alone.
-LIBRARIES := ftc-plant ftc-control ftc-lapack ftc-design ftc-simulate ftc-identify
+LIBRARIES := ftc-plant ftc-control ftc-record ftc-lapack ftc-design ftc-simulate ftc-baselines ftc-identify
 
 # Cargo takes a version it has unpacked once for unchanged for ever, also from the registry that
 # it makes of these archives: what it unpacked of an earlier state goes first.

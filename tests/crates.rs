@@ -13,14 +13,31 @@ fn root() -> &'static Path {
     Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/.."))
 }
 
-/// What each library crate may need of this project; dependencies of tests do not count.
-const ARROWS: [(&str, &[&str]); 6] = [
+/// What each library crate and each FMU may need of this project; dependencies of tests do not count.
+const ARROWS: [(&str, &[&str]); 10] = [
     ("ftc-control", &[]),
     ("ftc-lapack", &[]),
     ("ftc-plant", &[]),
-    ("ftc-design", &["ftc-control", "ftc-lapack", "ftc-plant"]),
-    ("ftc-simulate", &["ftc-control", "ftc-design", "ftc-plant"]),
+    ("ftc-record", &["ftc-control", "ftc-plant"]),
+    (
+        "ftc-design",
+        &["ftc-control", "ftc-lapack", "ftc-plant", "ftc-record"],
+    ),
+    ("ftc-simulate", &["ftc-control", "ftc-plant", "ftc-record"]),
+    (
+        "ftc-baselines",
+        &["ftc-control", "ftc-design", "ftc-plant", "ftc-simulate"],
+    ),
     ("ftc-identify", &[]),
+    // What runs in an FMU: neither synthesis nor certificates.
+    (
+        "ftc-controller-fmu",
+        &["ftc-control", "fmu-abi", "model-description"],
+    ),
+    (
+        "ftc-plant-fmu",
+        &["ftc-plant", "ftc-simulate", "fmu-abi", "model-description"],
+    ),
 ];
 
 fn packages() -> Vec<Value> {

@@ -4,9 +4,9 @@
 mod common;
 
 use common::{Channel, plant, scenario};
+use ftc_baselines::predictive::{Predictive, PredictiveSpec};
 use ftc_control::parameters::Limits;
 use ftc_plant::scenario::Waveform;
-use ftc_simulate::baselines::predictive::{Predictive, PredictiveSpec};
 use ftc_simulate::{PlantSimulator, Trajectory, Variant, run_with};
 
 fn spec(limit: f64) -> PredictiveSpec {

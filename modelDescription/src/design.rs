@@ -1,13 +1,12 @@
 //! The design as an FMU carries it, and what the tables need of it.
 
 use crate::{Interface, SignalInfo};
-use ftc_design::{ControllerDesign, Design, RecordError, Signal, Signals};
 use ftc_plant::scenario::{ModeInterval, Waveform};
-use ftc_plant::{Dimensions, Scenario, SwitchedPlant, TruePlant};
+use ftc_plant::{Dimensions, Scenario, SwitchedPlant};
+use ftc_record::{ControllerDesign, DesignRecord, RecordError, Signal, Signals};
 use minicbor::Decoder;
 use minicbor::data::Type;
 use serde::Deserialize;
-use serde::de::IgnoredAny;
 
 /// Name of the design in an FMU's `resources` folder: CBOR (RFC 8949), the record as a map of its fields.
 pub const DESIGN_FILE: &str = "design.cbor";
@@ -39,52 +38,31 @@ pub enum DesignFileError {
     Check(#[from] RecordError),
 }
 
-/// The bytes of [`DESIGN_FILE`]: what the binaries read of a design, which is all but its proof.
+/// The bytes of [`DESIGN_FILE`].
 ///
 /// # Errors
 /// What the writer says.
 #[cfg(feature = "write")]
-pub fn write_design(design: &Design) -> Result<Vec<u8>, DesignFileError> {
-    let mut running = design.clone();
-    running.proof = None;
-    Ok(minicbor_serde::to_vec(&running)?)
+pub fn write_design(record: &DesignRecord) -> Result<Vec<u8>, DesignFileError> {
+    Ok(minicbor_serde::to_vec(record)?)
 }
 
-/// [`Design`] without its proof, which is not there: to be able to read it, too, took a seventh of a binary.
-/// Of the experiment `S` and the true plant `T` is read what the reader needs.
+/// What a controller needs of a [`DesignRecord`].
 #[derive(Deserialize)]
-struct Running<S, T> {
+struct Running {
     format: u32,
     name: String,
     signals: Signals,
     plant: SwitchedPlant,
     controller: ControllerDesign,
-    #[serde(default)]
-    true_plant: T,
-    scenario: S,
+    scenario: Course,
 }
 
-/// The course of a [`Scenario`]: all of it that a controller needs.
+/// The course of an experiment: all of it that a controller needs.
 #[derive(Deserialize)]
 struct Course {
     steps: u64,
     schedule: Vec<ModeInterval>,
-}
-
-impl Running<Scenario, TruePlant> {
-    fn checked(self) -> Result<Design, RecordError> {
-        let mut design = Design::new(
-            &self.name,
-            self.plant,
-            self.signals,
-            self.controller,
-            self.scenario,
-        );
-        design.format = self.format;
-        design.true_plant = self.true_plant;
-        design.check()?;
-        Ok(design)
-    }
 }
 
 /// Whether no list or map stands in more than [`MOST_NESTED`] others: the reader calls itself for each.
@@ -127,8 +105,10 @@ fn decode<'a, R: Deserialize<'a>>(bytes: &'a [u8]) -> Result<R, DesignFileError>
 ///
 /// # Errors
 /// Bytes that hold no design, or one whose sizes do not agree.
-pub fn read_design(bytes: &[u8]) -> Result<Design, DesignFileError> {
-    Ok(decode::<Running<Scenario, TruePlant>>(bytes)?.checked()?)
+pub fn read_design(bytes: &[u8]) -> Result<DesignRecord, DesignFileError> {
+    let record: DesignRecord = decode(bytes)?;
+    record.check()?;
+    Ok(record)
 }
 
 /// The same without what only the simulated plant needs: it is as designed, and nothing happens to it but
@@ -136,26 +116,26 @@ pub fn read_design(bytes: &[u8]) -> Result<Design, DesignFileError> {
 ///
 /// # Errors
 /// As [`read_design`].
-pub fn read_controller(bytes: &[u8]) -> Result<Design, DesignFileError> {
-    let read: Running<Course, IgnoredAny> = decode(bytes)?;
+pub fn read_controller(bytes: &[u8]) -> Result<DesignRecord, DesignFileError> {
+    let read: Running = decode(bytes)?;
     let dims = Dimensions::check(&read.plant).map_err(RecordError::from)?;
     let reference = vec![Waveform::ZERO; read.controller.feedback.tracked.len()];
     let mut scenario = Scenario::new(read.scenario.steps, reference, dims);
     scenario.schedule = read.scenario.schedule;
-    let whole = Running {
-        format: read.format,
-        name: read.name,
-        signals: read.signals,
-        plant: read.plant,
-        controller: read.controller,
-        true_plant: TruePlant::default(),
+    let mut record = DesignRecord::new(
+        &read.name,
+        read.plant,
+        read.signals,
+        read.controller,
         scenario,
-    };
-    Ok(whole.checked()?)
+    );
+    record.format = read.format;
+    record.check()?;
+    Ok(record)
 }
 
 /// The disturbances as described, or else by their number alone.
-fn disturbances(design: &Design, count: usize) -> Vec<SignalInfo> {
+fn disturbances(design: &DesignRecord, count: usize) -> Vec<SignalInfo> {
     let described = &design.signals.disturbances;
     (0..count)
         .map(|at| match described.get(at) {
@@ -173,8 +153,9 @@ fn disturbances(design: &Design, count: usize) -> Vec<SignalInfo> {
         .collect()
 }
 
-impl From<&Design> for Interface {
-    fn from(design: &Design) -> Self {
+impl Interface {
+    /// That of a design.
+    pub fn of(design: &DesignRecord) -> Self {
         let plant = &design.plant;
         let sample_time = plant.sample_time;
         let first = design.scenario.mode(0, sample_time);

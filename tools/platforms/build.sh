@@ -10,7 +10,7 @@
 set -euo pipefail
 cd "$(dirname "$0")/../.."
 
-packages=(--package ftc-controller-fmu --package ftc-plant-fmu --lib --release --config tools/platforms/fmu.toml)
+packages=(--package ftc-controller-fmu --package ftc-plant-fmu --lib --release)
 
 has_library_for() {
     [ -d "$("${RUSTC:-rustc}" --print target-libdir --target "$1")" ]

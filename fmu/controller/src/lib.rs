@@ -144,7 +144,7 @@ impl Slave for ControllerFmu {
         let bytes = resource::read_verified(resources, DESIGN_FILE, CONTROLLER, guid)?;
         let design =
             model_description::read_controller(&bytes).map_err(|error| error.to_string())?;
-        let table = model_description::controller(&Interface::from(&design));
+        let table = model_description::controller(&Interface::of(&design));
         let modes = 0..design.plant.modes.len();
         let first_mode = design.scenario.mode(0, design.plant.sample_time);
         let controller = Controller::new(design.parameters()).map_err(|error| error.to_string())?;

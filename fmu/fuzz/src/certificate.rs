@@ -64,7 +64,7 @@ pub fn prove_forged(forged: &Forged) {
 fn prove(design: &str, certificate: &str, fits: bool) -> Option<Result<(), String>> {
     let design: Design = serde_json::from_str(design).ok()?;
     let resource = model_description::write_design(&design).ok()?;
-    let mut design = model_description::read_design(&resource).ok()?;
+    let mut design = Design::from(model_description::read_design(&resource).ok()?);
     let shipped: Certificate = serde_json::from_slice(certificate.as_bytes()).ok()?;
     let shipped = match fits {
         true => Certificate::new(shipped.proof, &resource),

@@ -5,7 +5,7 @@ mod common;
 
 use common::Channel;
 use ftc_control::Controller;
-use ftc_design::{Design, Signals};
+use ftc_record::{DesignRecord, Signals};
 use ftc_simulate::PlantSimulator;
 use ftc_simulate::plant::External;
 use model_description::{CONTROLLER, DESIGN_FILE, Interface, PLANT, VariableTable};
@@ -25,23 +25,27 @@ pub struct Model {
 
 impl Model {
     /// The controller of a design.
-    pub fn controller(design: &Design) -> Self {
+    pub fn controller(design: &DesignRecord) -> Self {
         Self::unpacked(design, CONTROLLER, model_description::controller)
     }
 
     /// The plant of a design.
-    pub fn plant(design: &Design) -> Self {
+    pub fn plant(design: &DesignRecord) -> Self {
         Self::unpacked(design, PLANT, model_description::plant)
     }
 
-    fn unpacked(design: &Design, identifier: &str, table: fn(&Interface) -> VariableTable) -> Self {
+    fn unpacked(
+        design: &DesignRecord,
+        identifier: &str,
+        table: fn(&Interface) -> VariableTable,
+    ) -> Self {
         let folder = tempfile::tempdir().expect("a folder for the resources");
         let bytes = model_description::write_design(design).expect("a design is plain data");
         std::fs::write(folder.path().join(DESIGN_FILE), &bytes).expect("the folder is writable");
         Self {
             folder,
             guid: model_description::guid(identifier, &bytes),
-            table: table(&Interface::from(design)),
+            table: table(&Interface::of(design)),
         }
     }
 
@@ -57,16 +61,16 @@ pub fn location(folder: &Path) -> String {
 }
 
 /// The paper's example under noise, its modes switched at half time.
-pub fn example() -> Design {
+pub fn example() -> DesignRecord {
     let controller = common::controller_design(Channel::State, 0.005);
     let plant = common::plant(Channel::State);
     let signals = Signals::numbered(plant.dimensions());
     let scenario = common::scenario(common::reference("square"), 0.005, 1);
-    Design::new("paper", plant, signals, controller, scenario)
+    DesignRecord::new("paper", plant, signals, controller, scenario)
 }
 
 /// Measurement and command of the native loop, controller first, at each of `ticks` ticks.
-pub fn native(design: &Design, ticks: usize) -> Vec<(Vec<f64>, Vec<f64>)> {
+pub fn native(design: &DesignRecord, ticks: usize) -> Vec<(Vec<f64>, Vec<f64>)> {
     let controller = Controller::new(design.parameters()).expect("the example fits its plant");
     let plant = PlantSimulator::new(design.plant.clone(), design.scenario.clone());
     let (mut state, mut seen) = (controller.initial_state(0), plant.initial_state());

@@ -158,7 +158,7 @@ impl Slave for PlantFmu {
     fn load(resources: &Path, guid: &str) -> Result<Self, Refusal> {
         let bytes = resource::read_verified(resources, DESIGN_FILE, PLANT, guid)?;
         let design = model_description::read_design(&bytes).map_err(|error| error.to_string())?;
-        let table = model_description::plant(&Interface::from(&design));
+        let table = model_description::plant(&Interface::of(&design));
         let plant = design.plant;
         let modes = 0..plant.modes.len();
         let simulator = PlantSimulator::with_true_plant(plant, design.true_plant, design.scenario);

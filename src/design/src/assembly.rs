@@ -6,7 +6,7 @@ use super::harmonics;
 pub use super::harmonics::KnownDisturbance;
 use super::hypotheses::{self, HypothesesSpec};
 use super::{
-    CertificateError, ControlSpec, ControllerDesign, Design, DesignError, FORMAT, Failure,
+    CertificateError, ControlSpec, ControllerDesign, Design, DesignError, DesignRecord, Failure,
     ObserverSpec, RequestError, Run, Signal, Signals, check_controllable, synthesise_with,
 };
 use crate::coverage;
@@ -201,19 +201,18 @@ pub fn assemble_with(request: Request, run: &Run) -> Result<Design, Failure> {
         request.feedforward,
         &input_limits,
     );
+    let observer = synthesis.observer.observer.clone();
+    let controller = ControllerDesign::new(feedback, observer, estimator, request.compensation);
+    let mut record = DesignRecord::new(
+        &request.name,
+        request.plant,
+        request.signals,
+        controller,
+        request.scenario,
+    );
+    record.true_plant = request.true_plant;
     let design = Design {
-        format: FORMAT,
-        name: request.name,
-        signals: request.signals,
-        plant: request.plant,
-        controller: ControllerDesign {
-            feedback,
-            observer: synthesis.observer.observer.clone(),
-            estimator,
-            compensation: request.compensation,
-        },
-        true_plant: request.true_plant,
-        scenario: request.scenario,
+        record,
         proof: Some(synthesis.into()),
     };
     // What would be refused of the FMU is not shipped.

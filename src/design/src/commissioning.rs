@@ -5,10 +5,10 @@
 //! obtained by QR factorisation; `R` is kept, since it tells how far any later input lies from
 //! what the database has seen.
 
-use super::matrices::{dense, plain};
 use ftc_control::parameters::Predictor;
 use ftc_plant::noise;
 use ftc_plant::{Mode, spectral_radius};
+use ftc_record::{dense, plain};
 use nalgebra::{DMatrix, DVector};
 
 /// Healthy inputs and outputs of one mode, without a gap: row `k` holds `u(k)` (m) and `y(k)` (p).

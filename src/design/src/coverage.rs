@@ -7,7 +7,6 @@ use crate::augmented::scaled;
 use crate::derived;
 use crate::harmonics::{self, KnownDisturbance};
 use crate::hypotheses;
-use crate::matrices::dense;
 use crate::observer::{check_decoupling, lost_gains_fit};
 use crate::{
     CertificateError, Design, HypothesesSpec, ObserverDesign, RecordError, StateFeedback, Synthesis,
@@ -19,6 +18,7 @@ use ftc_control::parameters::{
 };
 use ftc_control::tuning::Tuning;
 use ftc_plant::scaling::Scaling;
+use ftc_record::dense;
 use nalgebra::DMatrix;
 
 /// How far a number may lie from what it is derived to be, relative to the largest of its kind:

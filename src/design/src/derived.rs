@@ -3,11 +3,11 @@
 
 use crate::Signal;
 use crate::feedforward;
-use crate::matrices::{dense, plain};
 use crate::running_loop::{TRANSFER_DECAY, TransferCertificate};
 use ftc_control::parameters::{Limits, StateFeedback, Transfer};
 use ftc_control::tuning::DatabaseTuning;
 use ftc_plant::SwitchedPlant;
+use ftc_record::{dense, plain};
 
 /// Noise that the state-based estimator assumes at least, relative to the threshold.
 const SMALLEST_NOISE: f64 = 0.05;

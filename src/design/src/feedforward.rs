@@ -14,8 +14,8 @@
 
 use super::StateFeedback;
 use super::augmented::{AugmentedMode, augment};
-use super::matrices::pseudo_inverse;
 use super::state_feedback::scaled_gain;
+use crate::pseudo_inverse::pseudo_inverse;
 use ftc_plant::SwitchedPlant;
 use nalgebra::DMatrix;
 

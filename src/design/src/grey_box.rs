@@ -12,10 +12,10 @@
 
 use crate::augmented::scaled;
 use crate::commissioning::{Database, RecordedDisturbance, commission};
-use crate::matrices::plain;
 use ftc_control::parameters::FittedMode;
 use ftc_plant::Mode;
 use ftc_plant::scaling::Scaling;
+use ftc_record::plain;
 use nalgebra::{DMatrix, DVector};
 
 /// Samples in a window, at least, and per unknown of its own.
@@ -903,7 +903,7 @@ mod tests {
             let still = DMatrix::identity(2, 2) - a;
             (c * still.lu().solve(b).unwrap())[(0, 0)]
         };
-        let [a, b, c] = [&fitted.a, &fitted.b, &fitted.c].map(crate::matrices::dense);
+        let [a, b, c] = [&fitted.a, &fitted.b, &fitted.c].map(ftc_record::dense);
         let truth = gain(&plant.a, &plant.b, &plant.c);
         (gain(&a, &b, &c) - truth).abs() / (gain(&model.a, &model.b, &model.c) - truth).abs()
     }
@@ -1024,7 +1024,7 @@ mod tests {
 
     fn as_fitted(mode: &Mode, fit: &Fit) -> Mode {
         let mut mode = mode.clone();
-        let dense = crate::matrices::dense;
+        let dense = ftc_record::dense;
         (mode.a, mode.b, mode.c) = (dense(&fit.mode.a), dense(&fit.mode.b), dense(&fit.mode.c));
         (mode.e, mode.f) = (dense(&fit.mode.e), dense(&fit.mode.f));
         mode
@@ -1104,7 +1104,7 @@ mod tests {
         let model = mode();
         let log = commission(&model, &[0.0], &[0.01], 400, 4);
         let found = fit_one(&model, log, None, 0.05).unwrap();
-        let a = crate::matrices::dense(&found.mode.a);
+        let a = ftc_record::dense(&found.mode.a);
         assert!((&a - &model.a).amax() < 0.02, "{a}");
         assert!(found.model_error > 0.02, "{found:?}");
     }

@@ -5,11 +5,11 @@
 //! `G_j G_i^+` times themselves in mode `j`. That is exact where the model is, and a better
 //! initial value than zero where the model is approximate.
 
-use super::matrices::plain;
 use super::units::power_of_two;
 use core::f64::consts::TAU;
 use ftc_control::parameters::{KnownPeriod, PhasorMap};
 use ftc_plant::{Mode, SwitchedPlant};
+use ftc_record::plain;
 use nalgebra::{Complex, DMatrix, DVector};
 
 /// What is known of the periodic disturbance.

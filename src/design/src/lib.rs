@@ -44,6 +44,7 @@ pub mod coverage;
 pub mod derived;
 #[cfg(feature = "solver")]
 mod feedforward;
+mod finished;
 #[cfg(feature = "solver")]
 mod grey_box;
 pub mod harmonics;
@@ -54,11 +55,13 @@ mod interior_point;
 #[cfg(feature = "solver")]
 pub mod lmi;
 mod lyapunov;
-mod matrices;
 pub mod observer;
 mod parallel;
 mod proof;
-mod record;
+#[cfg(feature = "solver")]
+mod pseudo_inverse;
+#[cfg(feature = "solver")]
+pub mod quadratic;
 mod request;
 pub mod riccati;
 pub mod running_loop;
@@ -77,13 +80,15 @@ pub mod work;
 pub use blocks::{BlockKind, BlockName};
 pub use certificate::{CertificateError, ControlCertificate};
 pub use controllability::{Uncontrollable, check_controllable};
+pub use finished::Design;
+pub use ftc_record::{
+    ControllerDesign, DesignRecord, FORMAT, RecordError, Signal, Signals, dense, mode_models, plain,
+};
 #[cfg(feature = "solver")]
 pub use hypotheses::{HypothesesSpec, MODE_LENGTH};
 pub use lyapunov::{DwellTime, Lyapunov};
-pub use matrices::{dense, mode_models, plain};
 pub use observer::{LostCertificate, ObserverCertificate, ObserverDesign};
 pub use proof::{ControlProof, ObserverProof, Proof};
-pub use record::{ControllerDesign, Design, FORMAT, RecordError, Signal, Signals};
 pub use request::RequestError;
 pub use running_loop::{LostSensors, RunningLoop, SwitchingGain};
 #[cfg(feature = "solver")]

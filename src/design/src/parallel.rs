@@ -2,15 +2,31 @@
 
 #[cfg(feature = "solver")]
 use rayon::prelude::*;
+#[cfg(feature = "solver")]
+use std::sync::{Mutex, PoisonError};
 
 /// What `find` makes of every item, in their order. Called inside a pool of threads (`rayon`), it works on
 /// several at the same time; what comes back is the same to the bit.
 pub(crate) fn each<T: Sync, R: Send>(items: &[T], find: impl Fn(&T) -> R + Sync + Send) -> Vec<R> {
     #[cfg(feature = "solver")]
     if rayon::current_thread_index().is_some() {
-        return items.par_iter().map(find).collect();
+        let found: Vec<Mutex<Option<R>>> = items.iter().map(|_| Mutex::new(None)).collect();
+        at_the_same_time(items.len(), &|index| {
+            let result = find(&items[index]);
+            *found[index].lock().unwrap_or_else(PoisonError::into_inner) = Some(result);
+        });
+        let found = found.into_iter().map(Mutex::into_inner);
+        return found
+            .filter_map(|result| result.unwrap_or_else(PoisonError::into_inner))
+            .collect();
     }
     items.iter().map(find).collect()
+}
+
+/// Does `work` for every index below `count`. Not generic: what `rayon` makes of it is compiled once.
+#[cfg(feature = "solver")]
+fn at_the_same_time(count: usize, work: &(dyn Fn(usize) + Sync)) {
+    (0..count).into_par_iter().for_each(work);
 }
 
 /// As [`each`], but the first error in the order of the items where there is one. Outside a pool nothing is

@@ -3,12 +3,12 @@
 //! Gains, observer, tracked outputs, latency and resonators stand in the record's controller and nowhere
 //! else; [`Design::synthesis`](crate::Design::synthesis) puts both together again, and that is what is proved.
 
-use super::matrices::dense;
 use super::{
     ControlCertificate, ControlSpec, DwellTime, LostCertificate, Lyapunov, ModeGains, Objective,
     ObserverCertificate, ObserverDesign, ObserverSpec, RunningLoop, StateFeedback, Synthesis,
 };
 use ftc_control::parameters::{self, FeedbackGains};
+use ftc_record::dense;
 use serde::{Deserialize, Serialize};
 
 /// Claims of a design and what proves them, together with plant and controller.

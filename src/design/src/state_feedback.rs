@@ -24,11 +24,12 @@ pub use synthesis::{synthesise, synthesise_with};
 pub(crate) use proof::scaled_gain;
 
 use super::certificate::ControlCertificate;
-use super::matrices::{plain, pseudo_inverse_in};
 use super::{ControlSpec, DwellTime};
+use crate::pseudo_inverse::pseudo_inverse_in;
 use ftc_control::parameters::{self, FeedbackGains};
 use ftc_plant::SwitchedPlant;
 use ftc_plant::rows;
+use ftc_record::plain;
 use nalgebra::DMatrix;
 use serde::{Deserialize, Serialize};
 

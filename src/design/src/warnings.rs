@@ -2,10 +2,10 @@
 //!
 //! A warning is no error: nothing that was proved depends on it.
 
+use crate::Design;
 use crate::apart::{self, Apart};
 use crate::assembly::DatabaseSource;
 use crate::commissioning::{Database, model_predictor};
-use crate::record::Design;
 use ftc_control::Matrix;
 use ftc_control::estimator::leverage;
 use ftc_control::parameters::{Estimator, EstimatorMethod, Predictor};

@@ -75,6 +75,24 @@ pub struct Report<'a> {
     pub mode: Option<usize>,
 }
 
+impl<'a> Report<'a> {
+    /// Of a regulator that is told the mode.
+    pub fn new(
+        estimate: &'a [f64],
+        fault: &'a [f64],
+        residual: &'a [f64],
+        flagged: &'a [bool],
+    ) -> Self {
+        Self {
+            estimate,
+            fault,
+            residual,
+            flagged,
+            mode: None,
+        }
+    }
+}
+
 /// Every signal of one sample.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 #[non_exhaustive]

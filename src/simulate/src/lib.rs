@@ -20,7 +20,6 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
-pub mod baselines;
 pub mod closed_loop;
 pub mod integrate;
 pub mod metrics;

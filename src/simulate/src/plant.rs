@@ -16,11 +16,11 @@ use departed::Departed;
 use energy::Sampled;
 use ftc_control::state::State;
 use ftc_control::{Matrix, kernel};
-use ftc_design::plain;
 use ftc_plant::TruePlant;
 use ftc_plant::noise::Noise;
 use ftc_plant::scenario::{FaultEvent, Scenario};
 use ftc_plant::{Deviation, Mode, SwitchedPlant};
+use ftc_record::plain;
 use schedule::{Schedule, Signal};
 use serde::{Deserialize, Serialize};
 

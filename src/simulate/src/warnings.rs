@@ -4,9 +4,9 @@ use crate::Variant;
 use crate::closed_loop::Record;
 use ftc_control::estimator::InputHistory;
 use ftc_control::parameters::{Estimator, EstimatorMethod};
-use ftc_design::Design;
 use ftc_plant::TruePlant;
 use ftc_plant::deviation::Destabilised;
+use ftc_record::DesignRecord;
 
 /// Share of the samples of a run that may lie outside the database without a warning.
 const SHARE_OUTSIDE: f64 = 0.05;
@@ -102,7 +102,7 @@ pub enum RunWarning {
 /// What a run's warnings rest on, gathered sample by sample.
 #[derive(Debug)]
 pub struct RunWatch<'a> {
-    design: &'a Design,
+    design: &'a DesignRecord,
     variant: Variant,
     samples: usize,
     /// Samples in which each input is at a limit.
@@ -119,7 +119,7 @@ pub struct RunWatch<'a> {
 
 impl<'a> RunWatch<'a> {
     /// Nothing seen yet.
-    pub fn new(design: &'a Design, variant: Variant) -> Self {
+    pub fn new(design: &'a DesignRecord, variant: Variant) -> Self {
         let diodes = match design.true_plant.clone().into_parts() {
             (TruePlant::Rectifier(rectifier), _) => Some(rectifier.diode_voltage()),
             _ => None,
@@ -169,7 +169,12 @@ impl<'a> RunWatch<'a> {
 }
 
 /// All warnings of the runs of a design; each with the first tick it could not be integrated through.
-pub fn of_runs(design: &Design, runs: &[(RunWatch<'_>, Option<u64>)]) -> Vec<RunWarning> {
+/// `command_noise` is the standard deviation of each command (m) in each mode, where it is known.
+pub fn of_runs(
+    design: &DesignRecord,
+    command_noise: &[Vec<f64>],
+    runs: &[(RunWatch<'_>, Option<u64>)],
+) -> Vec<RunWarning> {
     let ftc = || {
         runs.iter()
             .map(|(run, _)| run)
@@ -187,14 +192,14 @@ pub fn of_runs(design: &Design, runs: &[(RunWatch<'_>, Option<u64>)]) -> Vec<Run
         .chain(ftc().flat_map(saturated))
         .chain(ftc().flat_map(capped))
         .chain(ftc().flat_map(unnoticed))
-        .chain(noisy_commands(design))
+        .chain(noisy_commands(design, command_noise))
         .chain(stopped)
         .chain(diodes)
         .collect()
 }
 
 /// Modes that the true plant's own matrices make unstable.
-fn unstable(design: &Design) -> impl Iterator<Item = RunWarning> {
+fn unstable(design: &DesignRecord) -> impl Iterator<Item = RunWarning> {
     let lost = design.true_plant.linear(&design.plant);
     let lost = lost.destabilised(&design.plant);
     lost.into_iter().map(RunWarning::UnstablePlant)
@@ -271,11 +276,7 @@ impl LargeFault {
 }
 
 /// Commands that the noise of the sensors moves by a large part of their range (or nominal value).
-fn noisy_commands(design: &Design) -> Vec<RunWarning> {
-    let Some(proof) = &design.proof else {
-        return Vec::new();
-    };
-    let noise = &proof.running_loop.command_noise;
+fn noisy_commands(design: &DesignRecord, noise: &[Vec<f64>]) -> Vec<RunWarning> {
     let inputs = design.signals.inputs.iter().enumerate();
     let deviations = inputs.map(|(index, input)| {
         let range = input.min.zip(input.max);
@@ -331,7 +332,7 @@ impl Held {
 /// What of a run lay outside the healthy database: its inputs are played once more.
 #[derive(Debug)]
 struct OutsideDatabase<'a> {
-    design: &'a Design,
+    design: &'a DesignRecord,
     /// The inputs so far and the last command; none before the first sample.
     played: Option<(InputHistory, Vec<f64>)>,
     /// How many samples.
@@ -341,7 +342,7 @@ struct OutsideDatabase<'a> {
 }
 
 impl<'a> OutsideDatabase<'a> {
-    fn new(design: &'a Design) -> Self {
+    fn new(design: &'a DesignRecord) -> Self {
         Self {
             design,
             played: None,

@@ -326,7 +326,7 @@ impl Signals {
 
 /// Runs an instance beside the controller it must be; the first difference is the error.
 fn beside(slave: &Slave, design: &Design) -> Result<(), String> {
-    let table: VariableTable = model_description::controller(&Interface::from(design));
+    let table: VariableTable = model_description::controller(&Interface::of(design));
     let start = Values::start(&table);
     let controller = Controller::new(design.parameters()).map_err(|error| error.to_string())?;
     let [measurement, reference, mode_span] =

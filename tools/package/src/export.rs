@@ -175,7 +175,7 @@ pub fn export(design: &Design, options: &Options) -> Result<Exported, Error> {
         certificate: serde_json::to_vec_pretty(&Certificate::new(proof, &resource))
             .map_err(|error| unwritten(certificate::PATH, error.to_string()))?,
         resource,
-        interface: Interface::from(design),
+        interface: Interface::of(design),
         runs: documentation::runs(design),
         binaries: Binaries::find(options)?,
         key,
@@ -223,7 +223,7 @@ impl Kind {
     /// What the XML writer says.
     pub fn describe(&self, design: &Design, resource: &[u8]) -> Result<String, Error> {
         let identifier = &self.identifier(design);
-        let interface = Interface::from(design);
+        let interface = Interface::of(design);
         xml::write(&Document {
             model_name: identifier,
             model_identifier: identifier,

@@ -124,7 +124,7 @@ impl Fmu {
             .map_err(|why| refused(&format!("cannot be read ({why})")))?;
         // Nothing but what is looked at may stand in it.
         match model_description::write_design(&design) {
-            Ok(written) if written == *bytes => Ok((kind, design)),
+            Ok(written) if written == *bytes => Ok((kind, design.into())),
             _ => Err(refused("holds more than a design, or is written otherwise")),
         }
     }

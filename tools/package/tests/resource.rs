@@ -6,7 +6,7 @@
 mod common;
 
 use common::design;
-use ftc_design::Design;
+use ftc_design::DesignRecord;
 use model_description::{Interface, read_controller, read_design, write_design};
 use serde_json::Value;
 
@@ -36,15 +36,14 @@ fn every_example_is_read_back_from_little_more_than_its_numbers() {
         "tank.toml",
         "converter.toml",
     ] {
-        let mut design = design(example);
+        let design = design(example).record;
         let bytes = write_design(&design).unwrap();
-        design.proof = None;
         assert_eq!(read_design(&bytes).unwrap(), design, "{example}");
         let controlling = read_controller(&bytes).unwrap();
         assert_eq!(controlling.parameters(), design.parameters(), "{example}");
-        let table = |design| model_description::controller(&Interface::from(design));
+        let table = |design| model_description::controller(&Interface::of(design));
         assert_eq!(table(&controlling), table(&design), "{example}");
-        let first = |design: &Design| design.scenario.mode(0, design.plant.sample_time);
+        let first = |design: &DesignRecord| design.scenario.mode(0, design.plant.sample_time);
         assert_eq!(first(&controlling), first(&design), "{example}");
         let most = NAMES + NUMBER * numbers(&serde_json::to_value(&design).unwrap());
         assert!(

@@ -3,10 +3,10 @@
 use crate::robustness;
 use crate::table::{Table, number};
 use crate::{Digest, warnings};
+use ftc_baselines::comparison::{BaselineError, Baselines, Bound};
 use ftc_control::Controller;
 use ftc_design::Design;
 use ftc_plant::Dimensions;
-use ftc_simulate::baselines::comparison::{BaselineError, Baselines, Bound};
 use ftc_simulate::closed_loop::{Loop, Merits, Record};
 use ftc_simulate::warnings::RunWatch;
 use ftc_simulate::{PlantSimulator, Variant, run};

@@ -110,9 +110,9 @@ fn lags(outputs: usize, disturbances: usize, steps: u64) -> Design {
 fn hostile(mut design: Design) -> Design {
     design.name = HOSTILE.into();
     let all = [
-        &mut design.signals.inputs,
-        &mut design.signals.outputs,
-        &mut design.signals.states,
+        &mut design.record.signals.inputs,
+        &mut design.record.signals.outputs,
+        &mut design.record.signals.states,
     ];
     for signal in all.into_iter().flatten() {
         signal.name = format!("{HOSTILE} {}", "long ".repeat(30));

@@ -129,7 +129,9 @@ const UNKNOWN_NOISE: &str = "neither scenario.noise nor estimator.threshold is g
 
 /// Of the runs of a design, each with the first tick that it could not be integrated through.
 pub fn of_runs(design: &Design, runs: &[(RunWatch<'_>, Option<u64>)]) -> Vec<String> {
-    let warnings = ftc_simulate::warnings::of_runs(design, runs);
+    let proof = design.proof.as_ref();
+    let noise = proof.map_or(&[][..], |proof| &proof.running_loop.command_noise);
+    let warnings = ftc_simulate::warnings::of_runs(design, noise, runs);
     let calmer = calmer(design);
     warnings
         .iter()

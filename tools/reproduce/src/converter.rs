@@ -9,10 +9,10 @@ mod page;
 
 use super::experiment::{self, OutputMerits, design, merits};
 use super::{Error, Findings, Progress};
+use ftc_baselines::predictive::{Predictive, PredictiveSpec};
 use ftc_control::Controller;
 use ftc_design::Design;
 use ftc_plant::scenario::{FaultEvent, FaultKind};
-use ftc_simulate::baselines::predictive::{Predictive, PredictiveSpec};
 use ftc_simulate::{PlantSimulator, Trajectory, Variant, run as simulate, run_with};
 use serde::Serialize;
 use serde_json::json;

@@ -19,8 +19,8 @@ mod converter;
 mod experiment;
 mod paper;
 
+use ftc_baselines::predictive::PredictiveError;
 use ftc_design::DesignError;
-use ftc_simulate::baselines::predictive::PredictiveError;
 use report::page::Page;
 use serde_json::Value;
 

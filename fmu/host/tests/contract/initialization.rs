@@ -5,10 +5,10 @@
 use fmu_host::model::example;
 use fmu_host::types::Status;
 use fmu_host::{Instance, Library, Model};
-use ftc_design::Design;
+use ftc_record::DesignRecord;
 
 /// The example, its second mode at rest elsewhere.
-fn two_resting_places() -> Design {
+fn two_resting_places() -> DesignRecord {
     let mut design = example();
     let point = &mut design.plant.modes[1].operating_point;
     (point.x, point.u, point.y) = (vec![0.5, 0.1], vec![0.25, -0.5], vec![0.75, 0.3]);

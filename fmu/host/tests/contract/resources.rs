@@ -5,7 +5,7 @@
 use crate::Pair;
 use fmu_host::model::location;
 use fmu_host::{Instance, Model, NotInstantiated};
-use ftc_design::Design;
+use ftc_record::DesignRecord;
 use model_description::{DESIGN_FILE, read_design, write_design};
 use std::fs;
 
@@ -63,7 +63,7 @@ fn designs_of_another_layout_or_of_other_sizes_are_refused() {
     let pair = Pair::load();
     let bytes = design(&pair.models[0]);
     let exported = read_design(&bytes).unwrap();
-    let altered = |change: &dyn Fn(&mut Design)| {
+    let altered = |change: &dyn Fn(&mut DesignRecord)| {
         let mut altered = exported.clone();
         change(&mut altered);
         write_design(&altered).unwrap()

@@ -2,10 +2,10 @@
 
 use super::ObserverDesign;
 use crate::certificate::{Enclosure, scaled_plant};
-use crate::matrices::dense;
 use ftc_control::Matrix;
 use ftc_control::parameters::ObserverKind;
 use ftc_plant::SwitchedPlant;
+use ftc_record::dense;
 
 /// The error dynamics `T_ij A_i - K_i C_i` of an observer in its certificate's units, enclosed; of a
 /// Kalman filter the error of the prediction, `A_i - A_i H_i C_i`, whatever mode follows.

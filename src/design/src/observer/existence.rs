@@ -2,10 +2,10 @@
 
 use crate::RequestError;
 use crate::augmented::scaled;
-use crate::matrices::dense;
-use crate::matrices::pseudo_inverse_in;
+use crate::pseudo_inverse::pseudo_inverse_in;
 use crate::units::power_of_two;
 use ftc_plant::{Mode, SwitchedPlant};
+use ftc_record::dense;
 use nalgebra::DMatrix;
 
 /// Singular values below this fraction of the largest count as zero.

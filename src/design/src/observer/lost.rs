@@ -14,12 +14,12 @@ use crate::certificate::{
     CertificateError, Enclosure, LyapunovMatrix, growth_block, prove, require, scaled_plant,
 };
 use crate::lyapunov::all_pairs;
-use crate::matrices::dense;
 use ftc_control::Matrix;
 #[cfg(feature = "solver")]
 use ftc_control::parameters::Observer;
 use ftc_control::parameters::{LostSet, ObserverKind};
 use ftc_plant::SwitchedPlant;
+use ftc_record::dense;
 use nalgebra::DMatrix;
 use serde::{Deserialize, Serialize};
 

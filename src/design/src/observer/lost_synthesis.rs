@@ -13,11 +13,11 @@ use crate::augmented::scaled;
 use crate::blocks::{BlockKind, BlockName};
 use crate::certificate::{Enclosure, LyapunovMatrix, largest_ratio};
 use crate::lmi::{Inequality, Problem};
-use crate::matrices::{dense, plain};
 use crate::parallel;
 use crate::riccati;
 use ftc_control::parameters::{LostSet, ObserverKind};
 use ftc_plant::{SwitchedPlant, spectral_radius};
+use ftc_record::{dense, plain};
 use nalgebra::DMatrix;
 
 /// A margin below this is no margin: the solver's own accuracy.

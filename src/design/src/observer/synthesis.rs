@@ -11,7 +11,6 @@ use crate::augmented::scaled;
 use crate::blocks::{BlockKind, BlockName};
 use crate::certificate::LyapunovMatrix;
 use crate::lmi::{Affine, Inequality, Problem, Variable};
-use crate::matrices::plain;
 use crate::units::{other_scaling, power_of_two};
 use crate::verdict::{DesignError, SolverFailure, infeasible};
 use crate::{Advice, DwellTime, Lyapunov, ObserverChoice, ObserverSpec};
@@ -19,6 +18,7 @@ use ftc_control::Matrix;
 use ftc_control::parameters::{Observer, ObserverKind};
 use ftc_plant::scaling::Scaling;
 use ftc_plant::{Dimensions, SwitchedPlant, spectral_radius};
+use ftc_record::plain;
 use nalgebra::DMatrix;
 
 /// A margin below this is no margin: the solver's own accuracy.

@@ -16,12 +16,12 @@
 
 use crate::augmented::{AugmentedMode, augment, design_disturbance, readings};
 use crate::certificate::{Enclosure, scaled_plant};
-use crate::matrices::dense;
 use crate::state_feedback::scaled_gain;
 use crate::{StateFeedback, Units};
 use ftc_control::Matrix;
 use ftc_control::parameters::{Observer, ObserverKind};
 use ftc_plant::SwitchedPlant;
+use ftc_record::dense;
 use nalgebra::DMatrix;
 
 /// What all modes and all sets of lost sensors share.

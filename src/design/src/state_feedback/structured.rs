@@ -19,7 +19,7 @@ use crate::interior_point::{
     Block, Bound, Congruence, Point, Problem, Product, Settings, Solution, maximise,
 };
 use crate::lmi::Margin;
-use crate::matrices::pseudo_inverse;
+use crate::pseudo_inverse::pseudo_inverse;
 use crate::solver::{Run, Step};
 use crate::verdict::SolverFailure;
 use crate::{ControlSpec, Lyapunov};

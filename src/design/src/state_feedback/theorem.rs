@@ -5,7 +5,7 @@ use crate::augmented::AugmentedMode;
 use crate::blocks::{BlockKind, BlockName};
 use crate::certificate::FactoredLyapunov;
 use crate::lmi::{Affine, Inequality, Margin, Problem, Variable, trace};
-use crate::matrices::pseudo_inverse;
+use crate::pseudo_inverse::pseudo_inverse;
 use crate::verdict::SolverFailure;
 use crate::{ControlSpec, Lyapunov};
 use nalgebra::DMatrix;

@@ -14,13 +14,12 @@
 //! reference, and `P` solves the Riccati equation. With the states eliminated the programme differs
 //! from sample to sample in its linear term alone, so it is prepared once per mode.
 
-use crate::closed_loop::{Regulator, Report};
-use crate::plant::PlantState;
-use clarabel::algebra::CscMatrix;
-use clarabel::solver::{DefaultSettings, DefaultSolver, IPSolver, SupportedConeT};
 use ftc_control::parameters::Limits;
+use ftc_design::quadratic::{QuadraticProgram, RefusedProgram};
 use ftc_design::riccati;
 use ftc_plant::{Mode, SwitchedPlant};
+use ftc_simulate::closed_loop::{Regulator, Report};
+use ftc_simulate::plant::PlantState;
 use nalgebra::{DMatrix, DVector};
 use std::ops::AddAssign;
 
@@ -76,7 +75,7 @@ pub struct Predictive {
 
 /// Everything of one mode that can be computed beforehand.
 struct Planner {
-    solver: DefaultSolver<f64>,
+    program: QuadraticProgram,
     /// m.
     inputs: usize,
     /// `q = from_state (x - x_s) + from_input u_s`.
@@ -104,8 +103,8 @@ pub struct PredictiveError {
 #[non_exhaustive]
 pub enum PredictiveCause {
     /// The solver refuses the quadratic programme.
-    #[error("the quadratic programme was refused: {0}")]
-    Programme(String),
+    #[error(transparent)]
+    Programme(#[from] RefusedProgram),
     /// The steady state cannot be computed.
     #[error("the equations of the steady state cannot be inverted")]
     SteadyState,
@@ -217,13 +216,12 @@ impl Regulator for Predictive {
     }
 
     fn report(&self) -> Report<'_> {
-        Report {
-            estimate: self.estimate.as_slice(),
-            fault: &self.no_fault,
-            residual: self.offset.as_slice(),
-            flagged: &self.no_flag,
-            mode: None,
-        }
+        Report::new(
+            self.estimate.as_slice(),
+            &self.no_fault,
+            self.offset.as_slice(),
+            &self.no_flag,
+        )
     }
 
     fn advance(&mut self, seen: &PlantState, acting: &[f64]) {
@@ -248,11 +246,9 @@ impl Planner {
         });
         let select = mode.c.select_rows(&spec.tracked);
         Ok(Self {
-            solver: programme(
+            program: QuadraticProgram::new(
                 &hessian,
-                spec.horizon,
-                &mode.operating_point.u,
-                &spec.limits,
+                &bounds(spec.horizon, &mode.operating_point.u, &spec.limits),
             )?,
             // The plan is in deviations from u0, the cost in deviations from u_s.
             from_input: -(&hessian * repeat),
@@ -266,11 +262,8 @@ impl Planner {
     /// The first inputs of the optimal plan as deviations from `u0` (m); none where the solver fails.
     /// The programme was prepared once: only its linear term (m N) changes.
     fn first_step(&mut self, linear: &DVector<f64>) -> Option<Vec<f64>> {
-        self.solver.update_q(&linear.as_slice().to_vec()).ok()?;
-        self.solver.solve();
-        let plan = &self.solver.solution.x;
-        let finite = plan.iter().all(|value| value.is_finite());
-        finite.then(|| plan.iter().take(self.inputs).copied().collect())
+        let plan = self.program.minimise(linear.as_slice())?;
+        Some(plan[..self.inputs].to_vec())
     }
 }
 
@@ -333,66 +326,14 @@ fn responses(a: &DMatrix<f64>, b: &DMatrix<f64>, horizon: usize) -> (DMatrix<f64
     (free, forced)
 }
 
-/// The quadratic programme with box constraints on every planned input.
-fn programme(
-    hessian: &DMatrix<f64>,
-    horizon: usize,
-    u0: &[f64],
-    limits: &[Limits],
-) -> Result<DefaultSolver<f64>, PredictiveCause> {
-    let size = hessian.nrows();
-    let m = u0.len();
-    let (mut rows, mut bounds) = (Vec::new(), Vec::new());
-    for step in 0..horizon {
-        for (input, (limit, centre)) in limits.iter().zip(u0).enumerate() {
-            let sides = [(1.0, limit.max), (-1.0, limit.min)];
-            for (sign, bound) in sides {
-                if let Some(bound) = bound {
-                    rows.push((step * m + input, sign));
-                    bounds.push(sign * (bound - centre));
-                }
-            }
-        }
-    }
-    let mut coefficients = DMatrix::zeros(rows.len(), size);
-    for (row, &(column, sign)) in rows.iter().enumerate() {
-        coefficients[(row, column)] = sign;
-    }
-    let upper = DMatrix::from_fn(
-        size,
-        size,
-        |r, c| if r <= c { hessian[(r, c)] } else { 0.0 },
-    );
-    let settings = DefaultSettings {
-        verbose: false,
-        presolve_enable: false,
-        chordal_decomposition_enable: false,
-        ..DefaultSettings::default()
-    };
-    let cones = [SupportedConeT::NonnegativeConeT(bounds.len())];
-    DefaultSolver::new(
-        &sparse(&upper),
-        &vec![0.0; size],
-        &sparse(&coefficients),
-        &bounds,
-        &cones,
-        settings,
-    )
-    .map_err(|why| PredictiveCause::Programme(why.to_string()))
-}
-
-fn sparse(matrix: &DMatrix<f64>) -> CscMatrix<f64> {
-    let (mut rows, mut columns, mut values) = (Vec::new(), Vec::new(), Vec::new());
-    for (column, entries) in matrix.column_iter().enumerate() {
-        for (row, &value) in entries.iter().enumerate() {
-            if value != 0.0 {
-                rows.push(row);
-                columns.push(column);
-                values.push(value);
-            }
-        }
-    }
-    CscMatrix::new_from_triplets(matrix.nrows(), matrix.ncols(), rows, columns, values)
+/// The bounds of every planned input, step by step, as deviations from `u0` (m N).
+fn bounds(horizon: usize, u0: &[f64], limits: &[Limits]) -> Vec<Limits> {
+    let inputs = limits.iter().zip(u0);
+    let inputs = inputs.map(|(limit, centre)| Limits {
+        min: limit.min.map(|bound| bound - centre),
+        max: limit.max.map(|bound| bound - centre),
+    });
+    (0..horizon).flat_map(|_| inputs.clone()).collect()
 }
 
 /// `[x_s; u_s]` as a linear function of the wanted tracked outputs: least squares of
@@ -504,7 +445,8 @@ mod tests {
             };
             let linear = &planner.from_state * DVector::from_column_slice(&deviation);
             let first = planner.first_step(&linear).unwrap();
-            let plan = DVector::from_column_slice(&planner.solver.solution.x);
+            let plan = planner.program.minimise(linear.as_slice()).unwrap();
+            let plan = DVector::from_column_slice(plan);
             prop_assert_eq!(&first[..], &plan.as_slice()[..2]);
             let cost = |u: &DVector<f64>| {
                 0.5 * u.dot(&(&condensed.hessian * u)) + linear.dot(u)

@@ -1,11 +1,11 @@
 //! The baselines of one design, in the scenario of that design.
 
-use super::predictive::{Predictive, PredictiveError, PredictiveSpec};
-use super::{DeadbeatSum, additive, response_delay};
-use crate::closed_loop::{Loop, Record, visit};
-use crate::{PlantSimulator, Variant};
+use crate::predictive::{Predictive, PredictiveError, PredictiveSpec};
+use crate::{DeadbeatSum, additive, response_delay};
 use ftc_control::{Controller, ControllerError};
 use ftc_design::{Design, DesignError};
+use ftc_simulate::closed_loop::{Loop, Record, visit};
+use ftc_simulate::{PlantSimulator, Variant};
 
 /// Samples the predictive controller looks ahead.
 const HORIZON: usize = 20;

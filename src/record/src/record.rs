@@ -1,7 +1,6 @@
-//! The design as a record: plain data, everything the exporter ships and the FMUs read.
+//! The record of a design: plain data, everything the exporter ships and the FMUs read.
 
-use super::matrices::mode_models;
-use super::{Proof, Synthesis};
+use crate::matrices::mode_models;
 use ftc_control::parameters::{
     Compensation, Estimator, EstimatorMethod, Limits, Observer, StateFeedback,
 };
@@ -16,10 +15,10 @@ use serde::{Deserialize, Serialize};
 /// Version of the record's layout; an FMU refuses a record of another.
 pub const FORMAT: u32 = 5;
 
-/// A finished design.
+/// What of a finished design an FMU holds.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[non_exhaustive]
-pub struct Design {
+pub struct DesignRecord {
     /// Layout version, [`FORMAT`].
     pub format: u32,
     /// Name of the design.
@@ -35,9 +34,6 @@ pub struct Design {
     pub true_plant: TruePlant,
     /// The experiment the plant FMU runs.
     pub scenario: Scenario,
-    /// What proves the gains; none where they were not made by synthesis.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub proof: Option<Proof>,
 }
 
 impl Signal {
@@ -199,9 +195,8 @@ pub enum RecordError {
     TruePlant,
 }
 
-impl Design {
-    /// A controller that was not made by synthesis, and so has no proof, for a plant that is as it was
-    /// designed for.
+impl DesignRecord {
+    /// A controller for a plant that is as it was designed for.
     pub fn new(
         name: &str,
         plant: SwitchedPlant,
@@ -217,15 +212,7 @@ impl Design {
             controller,
             true_plant: TruePlant::default(),
             scenario,
-            proof: None,
         }
-    }
-
-    /// The gains and the observer that run, with what proves them; none where they were not made by
-    /// synthesis.
-    pub fn synthesis(&self) -> Option<Synthesis> {
-        let running = &self.controller;
-        Some(self.proof.clone()?.of(&running.feedback, &running.observer))
     }
 
     /// The data of the on-line controller.
