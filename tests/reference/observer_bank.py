@@ -97,11 +97,11 @@ class Repeats:
         """Takes a sample in: the likelihood of a constant against that of the hypothesis."""
         self.before = self.evidence.copy()
         for q, y in enumerate(reading.y):
+            if reading.valid[q] and y != self.value[q]:
+                self.value[q], self.moved_from[q] = y, run.y[q]
             if not reading.valid[q] or q in h.stuck:
                 self.evidence[q] = self.count[q] = 0.0
                 continue
-            if y != self.value[q]:
-                self.value[q], self.moved_from[q] = y, run.y[q]
             moved = (run.y[q] - self.moved_from[q]) ** 2
             if self.count[q] == 0.0:
                 self.mean[q], self.count[q], self.evidence[q] = y, 1.0, 0.0
@@ -181,6 +181,9 @@ class Bank:
         self.noise_samples = self.tuning["noise_prior"]
         self.noise = np.zeros(p)
         self.repeats = Repeats(p, self.tuning)
+        # Whose reading repeats, whose does so no more, and the leading hypothesis without the readings that repeat.
+        self.repeating = self.resumed = NOBODY
+        self.aside: tuple[Hypothesis, Seen] | None = None
         self.unloaded, self.usual = (ModelRun(self.plants[mode], self.settings, self.tuning) for _ in range(2))
         self.apart = self.suspect = self.flagged = NOBODY
         self.misfit, self.model_valid = float(p), True
@@ -210,6 +213,7 @@ class Bank:
         reading = Reading(y, np.isfinite(y), self.noise)
         if not self.finds_mode:
             self._tell(told)
+        self._set_aside(reading)
         for run in (self.unloaded, self.usual):
             run.read(self.plants[self.best.mode], self.best.z[self.at.wave], self.noise)
         self.seen = {id(h): self._predict(h, reading) for h in self.hypotheses}
@@ -219,11 +223,34 @@ class Bank:
             self._go_on()
         else:
             self._compete(reading)
+        if self.aside:
+            h, seen = self.aside
+            h.misfit += self.tuning["misfit_share"] * (min(seen.square, 1e3) - h.misfit)
+            h.update(seen)
         self.first = False
         self.mode = self.best.mode
         self._correct_model_runs()
         self._learn_noise(reading)
         self._conclude(reading)
+
+    def _set_aside(self, reading: Reading) -> None:
+        before = self.repeating
+        again = reading.valid & (reading.y == self.repeats.value) & (not self.first)
+        self.repeating = frozenset(np.flatnonzero(again).tolist())
+        self.resumed = frozenset(q for q in before - self.repeating if reading.valid[q])
+        if not self.repeating:
+            self.aside = None
+            return
+        head = self.hypotheses[0]
+        h = self.aside[0] if self.aside else None
+        if h is None or (h.kinds, h.loose, h.mode) != (head.kinds, head.loose, head.mode):
+            h = head.copy()
+        self.aside = (h, self._predict(h, Reading(reading.y, reading.valid & ~again, reading.noise)))
+
+    def before_it_froze(self, q: int) -> Hypothesis | None:
+        """Returns what the leading hypothesis is without the readings that repeat, where it fits and `q` is one."""
+        fits = self.aside is not None and self.aside[0].misfit < 3.0 * self.at.p + 6.0
+        return self.aside[0] if fits and q in self.repeating else None
 
     def _predict(self, h: Hypothesis, reading: Reading) -> Seen:
         return h.predict(self.plants[h.mode], reading, outputs_may_err=self.outputs_may_err)
@@ -421,7 +448,7 @@ class Bank:
         self.moved_by = self.mode
         self._branch(shows_at_once=False)
         motion = Motion(u, self.moved, self.outputs_may_err)
-        for h in self.hypotheses:
+        for h in [*self.hypotheses, *([self.aside[0]] if self.aside else [])]:
             h.advance(self.plants[h.mode], self.settings, self.noise, motion)
         self._branch(shows_at_once=True)
 
@@ -447,7 +474,7 @@ class Bank:
                 self.hypotheses.append(child)
 
     def _tell(self, mode: int) -> None:
-        for h in self.hypotheses:
+        for h in [*self.hypotheses, *([self.aside[0]] if self.aside else [])]:
             if self.first:
                 h.mode = h.moved_by = mode
             elif h.mode != mode:
@@ -478,7 +505,9 @@ class Proposals:
             self.tuning["unlikely_beside"] + self.tuning["unlikely_per_output"] * self.at.p,
         )
         self.fault_size = np.array(bank.settings["fault_size"])
-        self.stay = h.score + self.seen.likelihood
+        # What repeated its reading and does so no more has not frozen, unless in another way.
+        self.resumed = h.stuck & bank.resumed
+        self.stay = h.score + self.seen.likelihood + len(self.resumed) * self.log_rate["stuck"]
         if h is not bank.best and self._has_come_to_nothing():
             self.stay -= self.tuning["fading"]
         self.valid = frozenset(np.flatnonzero(reading.valid).tolist())
@@ -658,9 +687,13 @@ class Proposals:
         return change
 
     def _frozen(self, q: int) -> Callable[[Hypothesis], None]:
-        repeats = self.bank.repeats
+        """Freezes a sensor: where its reading repeats exactly, nothing is kept of what it repeated."""
+        repeats, earlier = self.bank.repeats, self.bank.before_it_froze(q)
 
         def change(child: Hypothesis) -> None:
+            if earlier:
+                child.z, child.P, child.before = earlier.z.copy(), earlier.P.copy(), earlier.before.copy()
+                child.misfit, child.moved_by = earlier.misfit, earlier.moved_by
             variance = self.reading.noise[q] ** 2 / max(repeats.count[q], 1.0)
             child.open(self.at.fault[q], repeats.mean[q], variance)
             child.additive -= {q}
@@ -711,7 +744,8 @@ class Proposals:
                 log_rate = self.log_rate["change"]
                 again = -2.0 * log_rate
                 self._add("change", log_rate, self._biased(frozenset({q})), convinced=h.convinced, misfit=again)
-            self._release(frozenset({q}), self.log_rate["release"], convinced=h.convinced or len(h.flagged) == 1)
+            log_rate = 0.0 if q in self.resumed else self.log_rate["release"]
+            self._release(frozenset({q}), log_rate, convinced=h.convinced or len(h.flagged) == 1)
         if len(known) > 1:
             self._release(h.flagged, self.tuning["several"] * self.log_rate["release"], convinced=True)
 

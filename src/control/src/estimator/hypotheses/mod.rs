@@ -11,6 +11,7 @@
 //! given odds. What grows slowly can be a load or a sensor's drift: `suspect` names the sensors, and
 //! the policy decides. Where no hypothesis fits, the readings are used as they are and `model_valid` is false.
 
+mod aside;
 mod candidates;
 mod competition;
 mod effect;
@@ -156,6 +157,10 @@ pub struct BankState {
     moved_from: Vec<f64>,
     mean: Vec<f64>,
     count: Vec<f64>,
+    /// Sensors that show their last reading once more.
+    repeating: Sensors,
+    /// Sensors that did so a sample ago and do not now.
+    resumed: Sensors,
     best: usize,
     /// Sensors that loads have moved away from the model in open loop.
     apart: Sensors,
@@ -215,6 +220,8 @@ crate::state!(BankState {
         moved_by,
         first,
         noise_samples,
+        repeating,
+        resumed,
         best,
         apart,
         misfit,
@@ -259,6 +266,7 @@ impl Bank {
             self.tell(state, mode);
         }
         let bias = self.output_error();
+        self.set_aside(state, reading);
         let z = &state.slots[state.best].z;
         let model = self.model(state, state.best);
         for run in [&mut state.unloaded, &mut state.usual] {
@@ -290,6 +298,7 @@ impl Bank {
         } else {
             self.compete(state, reading);
         }
+        self.learn_aside(state);
         state.first = false;
         state.mode = state.slots[state.best].mode as usize;
         self.correct_model_runs(state, reading);
@@ -339,17 +348,17 @@ impl Bank {
         let (h, seen) = (&state.slots[head], &state.seen[head]);
         state.evidence_before.copy_from_slice(&state.evidence);
         for q in 0..p {
+            let y = reading.y[q];
+            if has(reading.valid, q) && y != state.repeated[q] {
+                state.repeated[q] = y;
+                state.moved_from[q] = state.unloaded.y[q];
+            }
             if !has(reading.valid, q) || has(h.stuck, q) {
                 state.evidence[q] = 0.0;
                 state.count[q] = 0.0;
                 continue;
             }
-            let y = reading.y[q];
             let variance = reading.noise[q] * reading.noise[q];
-            if y != state.repeated[q] {
-                state.repeated[q] = y;
-                state.moved_from[q] = state.unloaded.y[q];
-            }
             let moved = state.unloaded.y[q] - state.moved_from[q];
             if state.count[q] == 0.0 {
                 state.mean[q] = y;
@@ -500,7 +509,7 @@ impl Bank {
             u,
             moved: &state.moved,
         };
-        for slot in state.in_use.slots() {
+        for slot in state.in_use.slots().chain(self.in_use_aside(state)) {
             step.model = &self.modes[state.slots[slot].mode as usize];
             state.slots[slot].advance(&step, &mut state.scratch);
         }
@@ -513,7 +522,8 @@ impl BankState {
     pub fn is_consistent(&self) -> bool {
         let modes = self.probability.len();
         let exists = |h: &Hypothesis| h.mode.max(h.moved_by) < modes as u32;
-        self.in_use.is_consistent(self.slots.len())
+        self.in_use
+            .is_consistent(self.slots.len().saturating_sub(1))
             && self.in_use.contains(self.best)
             && self.mode < modes
             && self.slots.iter().all(exists)

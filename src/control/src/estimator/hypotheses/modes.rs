@@ -31,7 +31,7 @@ impl Bank {
 
     /// The plant is in `mode`, whatever else holds.
     pub(super) fn tell(&self, state: &mut BankState, mode: usize) {
-        for slot in state.in_use.slots() {
+        for slot in state.in_use.slots().chain(self.in_use_aside(state)) {
             let h = &mut state.slots[slot];
             match state.first {
                 true => (h.mode, h.moved_by) = (mode as u32, mode as u32),

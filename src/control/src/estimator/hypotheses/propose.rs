@@ -56,6 +56,8 @@ impl Bank {
             unlikely: seen.square > self.tuning.unlikely(p),
         };
         state.expectation.stale = true;
+        // What repeated its reading and does so no more has not frozen, unless in another way.
+        parent.stay += f64::from((h.stuck & state.resumed).count_ones()) * self.log_rates.stuck;
         if slot != state.best && self.has_come_to_nothing(h, reading) {
             parent.stay -= self.tuning.fading;
         }
@@ -265,7 +267,13 @@ impl Bank {
             if may_freeze && leads && state.evidence[q] > self.tuning.frozen_evidence {
                 let log_rate = log_rates.stuck + state.evidence_before[q];
                 let freeze = (Action::Freeze(q), log_rate, parent.convinced);
-                self.consider(state, parent, model, reading, freeze);
+                let frozen = Parent {
+                    slot: self.before_it_froze(state, q).unwrap_or(parent.slot),
+                    ..parent
+                };
+                state.expectation.stale = true;
+                self.consider(state, frozen, model, reading, freeze);
+                state.expectation.stale = true;
             }
             if !has(known, q) {
                 continue;
@@ -276,13 +284,12 @@ impl Bank {
             }
             let last = parent.flagged.count_ones() == 1;
             let convinced = parent.convinced || last;
-            self.propose_release(
-                state,
-                parent,
-                model,
-                reading,
-                (1 << q, log_rates.release, convinced),
-            );
+            let log_rate = match has(parent.stuck & state.resumed, q) {
+                true => 0.0,
+                false => log_rates.release,
+            };
+            let release = (1 << q, log_rate, convinced);
+            self.propose_release(state, parent, model, reading, release);
         }
         if known.count_ones() > 1 {
             let all = (

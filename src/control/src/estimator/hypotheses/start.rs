@@ -265,10 +265,7 @@ impl Bank {
             .collect();
         let mut in_use = SlotsInUse::NONE;
         (0..slots.len()).for_each(|slot| in_use.add(slot));
-        slots.resize(
-            2 * self.tuning.kept as usize + self.others(),
-            Hypothesis::new(layout),
-        );
+        slots.resize(self.aside() + 1, Hypothesis::new(layout));
         BankState {
             seen: vec![Innovation::new(layout); slots.len()],
             candidates: Candidates::new(slots.len(), p, model.jumps.len()),
@@ -292,6 +289,8 @@ impl Bank {
             moved_from: vec![0.0; p],
             mean: vec![0.0; p],
             count: vec![0.0; p],
+            repeating: 0,
+            resumed: 0,
             best: 0,
             apart: 0,
             misfit: p as f64,
