@@ -36,7 +36,7 @@ const ARROWS: [(&str, &[&str]); 10] = [
     ),
     (
         "ftc-plant-fmu",
-        &["ftc-plant", "ftc-simulate", "fmu-abi", "model-description"],
+        &["ftc-simulate", "fmu-abi", "model-description"],
     ),
 ];
 

@@ -13,12 +13,14 @@ use std::sync::atomic::{AtomicU32, Ordering};
 
 /// The library crates, and whether the root only names modules. Where it defines plain types as well, they
 /// count as below every module.
-const CRATES: [(&str, bool); 6] = [
+const CRATES: [(&str, bool); 8] = [
+    ("baselines", true),
     ("control", false),
     ("design", true),
     ("identify", false),
     ("lapack", true),
     ("plant", false),
+    ("record", true),
     ("simulate", true),
 ];
 

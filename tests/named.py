@@ -1,4 +1,4 @@
-"""Every file and symbol that CONTRIBUTING.md and ARCHITECTURE.md name in back-quotes is there; names are the field's.
+"""Every file and symbol that CONTRIBUTING.md, ARCHITECTURE.md and docs/paper.md name in back-quotes is there; names are the field's.
 
 A file may be named by the end of its path; one that the program writes is named by the sources. A symbol
 named in a numbered step must stand in a file that the step names; any other, somewhere in the sources. Names and
@@ -14,13 +14,13 @@ from fnmatch import fnmatch
 from pathlib import Path
 
 ROOT = Path(__file__).parents[1]
-GUIDES = ("CONTRIBUTING.md", "ARCHITECTURE.md")
+GUIDES = ("CONTRIBUTING.md", "ARCHITECTURE.md", "docs/paper.md")
 STEP = re.compile(r"^\d+\. .*(?:\n {3}.*)*", re.MULTILINE)
 FILE = re.compile(r"[\w*./-]*/[\w*.-]*|[\w*-]+\.(?:rs|py|sh|md|toml|json)|Makefile")
 # Metaphors that names, comments and messages once held.
 METAPHORS = re.compile(
     rb"\b(?:Dice|dice|Lottery|lottery|hasty|blip|bearable|SILENCE|ROOM|HASTE|Road|Contender|slowest_step|thickened"
-    rb"|Trust|Truth|lives on|leans on|hair of the|beyond suspicion|usual ways out|fault that hides)\b"
+    rb"|Trust|Truth|Play|Frame|lives on|leans on|hair of the|beyond suspicion|usual ways out|fault that hides)\b"
 )
 SYMBOL = re.compile(r"[A-Za-z_]\w*(?:::\w+)*")
 

@@ -198,7 +198,6 @@ pub(crate) fn growth_block(
 }
 
 /// The largest eigenvalue of `below^-1 above` for symmetric matrices, `below` positive definite.
-#[cfg(feature = "solver")]
 pub(crate) fn largest_ratio(above: &DMatrix<f64>, below: &DMatrix<f64>) -> Option<f64> {
     let factor = below.clone().cholesky()?.unpack();
     let half = factor.solve_lower_triangular(above)?;

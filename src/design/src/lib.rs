@@ -1,8 +1,8 @@
 //! Off line: gains, observers, predictor and certificate.
 //!
-//! The data types and the certificate need no solver; making gains does (feature `solver`, on by
-//! default). The solver links eight symbols of a BLAS and LAPACK: leave the feature `lapack` off in a
-//! program that links one, switch it on in a program that does not.
+//! Gains are made by a conic solver; certificates are proved without one. The solver links eight symbols of a
+//! BLAS and LAPACK: leave the feature `lapack` off in a program that links one, switch it on in a program that
+//! does not.
 //!
 //! Inside a thread pool of `rayon` (`pool.install(|| ...)`) parts that are independent, such as the modes under
 //! `dwell`, are worked on at the same time, with the same result to the bit.
@@ -25,54 +25,39 @@
 //! assert!(control.spectral_radius.iter().all(|&radius| radius < 0.98));
 //! # Ok::<(), ftc_design::DesignError>(())
 //! ```
-// Without the solver, what only a synthesis needs is never called.
-#![cfg_attr(not(feature = "solver"), allow(dead_code))]
 
 pub mod apart;
-#[cfg(feature = "solver")]
 pub mod as_printed;
-#[cfg(feature = "solver")]
 pub mod assembly;
 pub mod augmented;
 mod blocks;
 pub mod certificate;
 pub mod commissioning;
 mod controllability;
-#[cfg(feature = "solver")]
 pub mod coverage;
-#[cfg(feature = "solver")]
 pub mod derived;
-#[cfg(feature = "solver")]
 mod feedforward;
 mod finished;
-#[cfg(feature = "solver")]
 mod grey_box;
 pub mod harmonics;
-#[cfg(feature = "solver")]
 mod hypotheses;
-#[cfg(feature = "solver")]
 mod interior_point;
-#[cfg(feature = "solver")]
 pub mod lmi;
 mod lyapunov;
 pub mod observer;
 mod parallel;
 mod proof;
-#[cfg(feature = "solver")]
 mod pseudo_inverse;
-#[cfg(feature = "solver")]
 pub mod quadratic;
 mod request;
 pub mod riccati;
 pub mod running_loop;
-#[cfg(feature = "solver")]
 mod solver;
 mod spec;
 pub mod state_feedback;
 mod synthesis;
 mod units;
 mod verdict;
-#[cfg(feature = "solver")]
 pub mod warnings;
 pub mod weights;
 pub mod work;
@@ -84,19 +69,16 @@ pub use finished::Design;
 pub use ftc_record::{
     ControllerDesign, DesignRecord, FORMAT, RecordError, Signal, Signals, dense, mode_models, plain,
 };
-#[cfg(feature = "solver")]
 pub use hypotheses::{HypothesesSpec, MODE_LENGTH};
 pub use lyapunov::{DwellTime, Lyapunov};
 pub use observer::{LostCertificate, ObserverCertificate, ObserverDesign};
 pub use proof::{ControlProof, ObserverProof, Proof};
 pub use request::RequestError;
 pub use running_loop::{LostSensors, RunningLoop, SwitchingGain};
-#[cfg(feature = "solver")]
 pub use solver::{Run, Solver, Step};
 pub use spec::{ControlSpec, Objective, ObserverChoice, ObserverSpec, SpecError};
 pub use state_feedback::{ModeGains, StateFeedback};
 pub use synthesis::{Failure, Synthesis};
-#[cfg(feature = "solver")]
 pub use synthesis::{synthesise, synthesise_with};
 pub use units::Units;
 pub use verdict::{

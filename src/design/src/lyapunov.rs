@@ -104,7 +104,6 @@ pub struct DwellTime {
 
 impl DwellTime {
     /// Relative amounts by which a computed `mu` is raised, in turn, until it can be proved.
-    #[cfg(feature = "solver")]
     pub(crate) const ALLOWANCES: [f64; 4] = [1e-9, 1e-6, 1e-3, 1.0];
 
     /// From the proved factor `mu >= 1` and decay rate `0 < decay < 1`.

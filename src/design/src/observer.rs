@@ -7,27 +7,19 @@
 
 mod detectable;
 mod dynamics;
-#[cfg(feature = "solver")]
 mod existence;
-#[cfg(feature = "solver")]
 mod kalman;
 mod lost;
-#[cfg(feature = "solver")]
 mod lost_synthesis;
 mod proof;
-#[cfg(feature = "solver")]
 mod synthesis;
 
 pub(crate) use detectable::check_detectable;
-#[cfg(feature = "solver")]
 pub(crate) use existence::check_decoupling;
-#[cfg(feature = "solver")]
 pub(crate) use lost::gains_fit as lost_gains_fit;
 pub use lost::{LostCertificate, MOST_FOR_PAIRS, sets};
 
-#[cfg(feature = "solver")]
 pub use synthesis::synthesise;
-#[cfg(feature = "solver")]
 pub(crate) use synthesis::{Candidate, candidates, with_lost_sensors};
 
 use super::certificate::LyapunovMatrix;

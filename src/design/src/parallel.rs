@@ -1,14 +1,11 @@
 //! Independent parts of a design, worked on at the same time inside a pool of threads.
 
-#[cfg(feature = "solver")]
 use rayon::prelude::*;
-#[cfg(feature = "solver")]
 use std::sync::{Mutex, PoisonError};
 
 /// What `find` makes of every item, in their order. Called inside a pool of threads (`rayon`), it works on
 /// several at the same time; what comes back is the same to the bit.
 pub(crate) fn each<T: Sync, R: Send>(items: &[T], find: impl Fn(&T) -> R + Sync + Send) -> Vec<R> {
-    #[cfg(feature = "solver")]
     if rayon::current_thread_index().is_some() {
         let found: Vec<Mutex<Option<R>>> = items.iter().map(|_| Mutex::new(None)).collect();
         at_the_same_time(items.len(), &|index| {
@@ -24,7 +21,6 @@ pub(crate) fn each<T: Sync, R: Send>(items: &[T], find: impl Fn(&T) -> R + Sync 
 }
 
 /// Does `work` for every index below `count`. Not generic: what `rayon` makes of it is compiled once.
-#[cfg(feature = "solver")]
 fn at_the_same_time(count: usize, work: &(dyn Fn(usize) + Sync)) {
     (0..count).into_par_iter().for_each(work);
 }
@@ -35,7 +31,6 @@ pub(crate) fn all<T: Sync, R: Send, E: Send>(
     items: &[T],
     find: impl Fn(&T) -> Result<R, E> + Sync + Send,
 ) -> Result<Vec<R>, E> {
-    #[cfg(feature = "solver")]
     if rayon::current_thread_index().is_some() {
         return each(items, find).into_iter().collect();
     }

@@ -48,12 +48,13 @@ pub enum RequestError {
     },
     /// The log of a mode is too short to fit the mode's matrices to.
     #[error(
-        "mode {mode}: the log has no four stretches of {needed} samples without a gap in this mode: record more of it"
+        "mode {mode}: the log has fewer than {} samples of this mode in stretches of at least {needed} without a gap: \
+         record more of it", 4 * .needed
     )]
     ShortLog {
         /// The mode.
         mode: usize,
-        /// Samples of a stretch.
+        /// Samples of a stretch, which may contain switches.
         needed: usize,
     },
     /// The inputs of a log are commands that act a sample later.

@@ -12,14 +12,11 @@
 pub(crate) mod frequency;
 mod gain;
 mod model;
-#[cfg(feature = "solver")]
 mod selection;
 mod subject;
-#[cfg(feature = "solver")]
 mod switching;
 mod switching_proof;
 mod transfer;
-#[cfg(feature = "solver")]
 mod transfer_synthesis;
 
 use crate::blocks::{BlockKind, BlockName};
@@ -33,7 +30,6 @@ use serde::{Deserialize, Serialize};
 use subject::{Claim, Subject};
 use switching_proof::prove_switching;
 
-#[cfg(feature = "solver")]
 pub(crate) use selection::choose;
 pub use switching_proof::SwitchingGain;
 pub use transfer::{TRANSFER_DECAY, TransferCertificate};
@@ -84,7 +80,6 @@ pub struct LostSensors {
 
 impl RunningLoop {
     /// Everything that can be proved of a loop; `None` where not even a gain of a mode can.
-    #[cfg(feature = "solver")]
     pub(crate) fn of(
         plant: &SwitchedPlant,
         control: &StateFeedback,
@@ -158,7 +153,6 @@ impl RunningLoop {
 
     /// Proves bumpless transfer of the loop as well; `false` where no proof is found. A gain across switches
     /// is then claimed no longer: its proof knows nothing of what a switch does to the command.
-    #[cfg(feature = "solver")]
     pub(crate) fn certify_transfer(
         &mut self,
         plant: &SwitchedPlant,

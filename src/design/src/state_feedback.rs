@@ -2,23 +2,15 @@
 //!
 //! The command is `u = K x + K_u u_prev + G Z`, with one set of gains per mode.
 
-#[cfg(feature = "solver")]
 mod advice;
-#[cfg(feature = "solver")]
 mod direct;
 mod proof;
-#[cfg(feature = "solver")]
 mod riccati;
-#[cfg(feature = "solver")]
 mod structured;
-#[cfg(feature = "solver")]
 mod synthesis;
-#[cfg(feature = "solver")]
 mod theorem;
-#[cfg(feature = "solver")]
 mod transformation;
 
-#[cfg(feature = "solver")]
 pub use synthesis::{synthesise, synthesise_with};
 
 pub(crate) use proof::scaled_gain;

@@ -1,20 +1,15 @@
 //! State feedback, observer and the loop of both: one request, one verdict.
 
 use super::certificate::CertificateError;
-#[cfg(feature = "solver")]
 use super::observer;
 use super::observer::ObserverDesign;
-#[cfg(feature = "solver")]
 use super::running_loop;
 use super::running_loop::RunningLoop;
-#[cfg(feature = "solver")]
 use super::state_feedback;
 use super::state_feedback::StateFeedback;
 use super::verdict::DesignError;
-#[cfg(feature = "solver")]
 use super::{ControlSpec, ObserverSpec, Run, units};
 use ftc_plant::SwitchedPlant;
-#[cfg(feature = "solver")]
 use ftc_plant::scaling::Scaling;
 use serde::{Deserialize, Serialize};
 
@@ -43,7 +38,6 @@ impl Synthesis {
     }
 
     /// Proves bumpless transfer of the loop as well; `false` where no proof is found.
-    #[cfg(feature = "solver")]
     pub fn certify_transfer(&mut self, plant: &SwitchedPlant) -> bool {
         let (control, observer) = (&self.state_feedback, &self.observer);
         self.running_loop.certify_transfer(plant, control, observer)
@@ -55,7 +49,6 @@ impl Synthesis {
 ///
 /// # Errors
 /// As [`state_feedback::synthesise`] and [`observer::synthesise`].
-#[cfg(feature = "solver")]
 pub fn synthesise(
     plant: &SwitchedPlant,
     control: &ControlSpec,
@@ -76,7 +69,6 @@ pub fn synthesise(
 ///
 /// # Errors
 /// As [`synthesise`], with the part that was found.
-#[cfg(feature = "solver")]
 pub fn synthesise_with(
     plant: &SwitchedPlant,
     control: &ControlSpec,

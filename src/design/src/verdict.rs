@@ -71,7 +71,6 @@ impl Advice {
     }
 
     /// Decay rates that are tried when a faster one is infeasible.
-    #[cfg(feature = "solver")]
     pub(crate) const DECAYS: [f64; 10] = [0.5, 0.6, 0.7, 0.8, 0.9, 0.95, 0.98, 0.99, 0.995, 0.999];
 }
 
@@ -253,7 +252,6 @@ impl From<CertificateError> for DesignError {
     }
 }
 
-#[cfg(feature = "solver")]
 impl DesignError {
     /// Where advice on this error belongs; `None` where a changed request is not what is missing.
     pub(crate) fn advice_mut(&mut self) -> Option<&mut Vec<Advice>> {
@@ -266,7 +264,6 @@ impl DesignError {
 }
 
 /// The verdict on a conflict, without advice.
-#[cfg(feature = "solver")]
 pub(crate) fn infeasible(margin: f64, weights: Vec<(BlockName, f64)>) -> DesignError {
     DesignError::Infeasible(Infeasibility {
         margin: margin.min(0.0),
@@ -276,7 +273,6 @@ pub(crate) fn infeasible(margin: f64, weights: Vec<(BlockName, f64)>) -> DesignE
 }
 
 /// The blocks that carry a conflict, the heaviest first.
-#[cfg(feature = "solver")]
 pub(crate) fn by_weight(weights: Vec<(BlockName, f64)>) -> Vec<ConflictingBlock> {
     let mut blocks: Vec<ConflictingBlock> = weights
         .into_iter()

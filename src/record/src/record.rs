@@ -13,7 +13,7 @@ use ftc_plant::{Scenario, TruePlant};
 use serde::{Deserialize, Serialize};
 
 /// Version of the record's layout; an FMU refuses a record of another.
-pub const FORMAT: u32 = 5;
+pub const FORMAT: u32 = 6;
 
 /// What of a finished design an FMU holds.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]

@@ -7,8 +7,6 @@ use std::collections::BTreeMap;
 
 /// How many of the worst runs are kept.
 pub const WORST: usize = 10;
-/// Fault tolerance does worse than none where its true error is larger by more than this share.
-const WORSE: f64 = 0.01;
 
 /// The statistics of a set of runs; their memory does not grow with their number.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -83,7 +81,7 @@ impl Healthy {
         self.runs += 1;
         self.error.add(error);
         self.over_none.add(over_none);
-        self.worse_than_none += u64::from(over_none > 1.0 + WORSE);
+        self.worse_than_none += u64::from(over_none > 1.0 + report::robustness::WORSE);
         self.flagged += u64::from(flagged);
     }
 
@@ -157,7 +155,7 @@ impl Statistics {
             self.healthy.add(with, over_none, flagged);
         } else {
             self.faulty_runs += 1;
-            self.worse_than_none += u64::from(over_none > 1.0 + WORSE);
+            self.worse_than_none += u64::from(over_none > 1.0 + report::robustness::WORSE);
         }
         if let Some((mode, radius)) = outcome.unstable {
             let run = outcome.run;

@@ -1,10 +1,8 @@
 //! One sentence for whatever a parser complains about.
 
 use crate::{Error, shape, suggest};
+use ftc_tables::QUOTATION;
 use serde_path_to_error::{Path, Segment};
-
-/// Longest quotation from the user's file.
-const QUOTATION: usize = 60;
 
 /// Line and column of a byte of the text, from 1.
 pub fn place(text: &str, offset: usize) -> (usize, usize) {

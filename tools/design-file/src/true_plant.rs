@@ -13,9 +13,6 @@ use ftc_plant::{Deviation, SwitchedPlant, TruePlant};
 use std::borrow::Cow;
 use std::path::Path;
 
-/// Seed of relative errors, where none is given.
-const SEED: u64 = 1;
-
 /// What is simulated: the modes themselves, the named model they are linearised from, or another
 /// plant; other files are sought in `folder`.
 ///
@@ -99,7 +96,7 @@ fn motion(
             .map_err(|what| format!("scenario.plant: {what}"))?,
     };
     if error > 0.0 {
-        let seed = given.seed.map_or(Ok(SEED), |seed| {
+        let seed = given.seed.map_or(Ok(defaults::SEED), |seed| {
             u64::try_from(seed).map_err(|_| {
                 format!("scenario.plant.seed is {seed}: give a whole number, 0 or more")
             })

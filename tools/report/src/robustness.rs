@@ -16,7 +16,7 @@ const GAIN: f64 = 0.1;
 /// Height of a step on an input, relative to its nominal value.
 const STEP: f64 = 0.1;
 /// Fault tolerance does worse than none where its true error is larger by more than this share.
-const WORSE: f64 = 0.01;
+pub const WORSE: f64 = 0.01;
 /// Errors (root mean square, relative to the nominal value of the output) below this one do not matter.
 const NEGLIGIBLE: f64 = 1e-3;
 

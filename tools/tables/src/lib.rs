@@ -36,7 +36,7 @@ pub use table::{MOST_ROWS, Place, Row, Table};
 pub use time::{Clock, TimeColumn, find_time_column};
 
 /// Longest quotation from the user's file.
-const QUOTATION: usize = 60;
+pub const QUOTATION: usize = 60;
 
 /// A quotation from the user's file: printable and short.
 pub(crate) fn quote(text: &str) -> String {

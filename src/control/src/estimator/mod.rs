@@ -1,6 +1,7 @@
-//! The sensor-fault estimator: data-based projection with a reference window (41)-(62).
+//! The sensor-fault estimators: by default a bank of state-based hypotheses ([`hypotheses`]); as the paper has it,
+//! data-based projection with a reference window (41)-(62).
 //!
-//! A healthy database of inputs `U1` and outputs `Y1` fixes, by projection, what the output must
+//! In the latter a healthy database of inputs `U1` and outputs `Y1` fixes, by projection, what the output must
 //! be: `y_hat = y0 + Y1 U1^+ phi` (`predictor`). What the periodic disturbance adds is learned
 //! on line while no sensor is flagged (`harmonics`). The residual is what remains; each sensor's residual
 //! is judged against its own threshold (`decision`), widened by how far the present input lies

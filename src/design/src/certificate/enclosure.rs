@@ -59,7 +59,6 @@ impl Enclosure {
     }
 
     /// The midpoint, when the radius no longer matters.
-    #[cfg(feature = "solver")]
     pub(crate) fn into_midpoint(self) -> DMatrix<f64> {
         self.mid
     }

@@ -15,7 +15,6 @@ use crate::certificate::{
 };
 use crate::lyapunov::all_pairs;
 use ftc_control::Matrix;
-#[cfg(feature = "solver")]
 use ftc_control::parameters::Observer;
 use ftc_control::parameters::{LostSet, ObserverKind};
 use ftc_plant::SwitchedPlant;
@@ -209,7 +208,6 @@ pub(crate) fn changes(
 }
 
 /// Whether every gain for lost sensors is finite.
-#[cfg(feature = "solver")]
 pub(crate) fn gains_fit(observer: &Observer) -> bool {
     let gains = observer.lost.iter().flat_map(|set| &set.correction);
     gains.into_iter().all(Matrix::is_finite)

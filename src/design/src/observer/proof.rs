@@ -5,7 +5,6 @@ use super::dynamics::error_dynamics;
 use super::lost;
 use crate::Lyapunov;
 use crate::blocks::BlockKind;
-#[cfg(feature = "solver")]
 use crate::certificate::largest_ratio;
 use crate::certificate::{CertificateError, Enclosure, check_dwell, growth_block, prove, require};
 use crate::lyapunov::all_pairs;
@@ -60,7 +59,6 @@ fn verify(plant: &SwitchedPlant, design: &ObserverDesign) -> Result<(), Certific
 
 /// The least factor `mu >= 1` by which
 /// an observer's Lyapunov function exceeds `decay^2` over a switch.
-#[cfg(feature = "solver")]
 pub(crate) fn observer_growth(plant: &SwitchedPlant, design: &ObserverDesign) -> Option<f64> {
     let matrices = &design.certificate.lyapunov;
     let switches = all_pairs(plant.modes.len())

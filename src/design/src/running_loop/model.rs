@@ -90,7 +90,6 @@ impl<'a> Models<'a> {
     }
 
     /// The state feedback's loop of a mode, its state measured: floating point.
-    #[cfg(feature = "solver")]
     pub fn measured(&self, mode: usize) -> [Enclosure; 4] {
         let parts = self.parts(mode);
         let [a, b, h, d] = &parts.model;

@@ -3,9 +3,7 @@
 use super::{ModeGains, StateFeedback};
 use crate::augmented::{AugmentedMode, augment, scaled};
 use crate::blocks::BlockKind;
-#[cfg(feature = "solver")]
 use crate::blocks::BlockName;
-#[cfg(feature = "solver")]
 use crate::certificate::largest_ratio;
 use crate::certificate::{
     CertificateError, Coordinates, Enclosure, FactoredLyapunov, check_dwell, coordinates, prove,
@@ -162,7 +160,6 @@ pub(crate) fn scaled_gain(gains: &ModeGains, units: &Units, spec: &ControlSpec) 
 
 /// The dwell time that the factor between Lyapunov matrices `S` asks for, with the smallest `mu`
 /// that can be proved.
-#[cfg(feature = "solver")]
 pub(crate) fn provable_dwell(
     matrices: &[FactoredLyapunov],
     decay: f64,

@@ -31,9 +31,6 @@ const REACH: f64 = 1e6;
 /// Share of that at which the limit counts as active.
 const AT_REACH: f64 = 1e-2;
 
-/// How much larger than the identity the Lyapunov matrices of a centred solution may be on average.
-const CENTRED_TRACE: f64 = 10.0;
-
 /// What becomes of the scalar unknown.
 #[derive(Clone, Copy)]
 enum Scalar {
@@ -382,7 +379,7 @@ pub(super) fn centred(
     let mut theorem = Theorem::new(models, spec, group, Scalar::Margin, run);
     theorem.require_attenuation(1.0 / level);
     theorem.require_decay();
-    theorem.require_reach(CENTRED_TRACE);
+    theorem.require_reach(super::theorem::CENTRED_TRACE);
     let solution = theorem.solve(
         "centred gains",
         Settings {

@@ -266,7 +266,7 @@ fn least_level_within(
 }
 
 /// How much larger than the identity the Lyapunov matrices of a centred solution may be on average.
-const CENTRED_TRACE: f64 = 10.0;
+pub(super) const CENTRED_TRACE: f64 = 10.0;
 
 /// The gains of largest margin at a given `g` (T2), in coordinates where Lyapunov matrices near the
 /// identity will do.

@@ -47,7 +47,11 @@ impl PlantSimulator {
                 struck = true;
                 *value = match fault.kind {
                     FaultKind::Dropout => 0.0,
-                    _ => fault.reading(*value, *held, tick, te),
+                    FaultKind::Bias { .. }
+                    | FaultKind::Drift { .. }
+                    | FaultKind::GainLoss { .. }
+                    | FaultKind::Stuck
+                    | FaultKind::Intermittent { .. } => fault.reading(*value, *held, tick, te),
                 };
             }
             if !struck {
