@@ -1,5 +1,6 @@
-"""Every file and symbol that CONTRIBUTING.md, ARCHITECTURE.md and docs/paper.md name in back-quotes is there; names are the field's.
+"""Every file and symbol that the guides name in back-quotes is there; names are the field's.
 
+The guides are CONTRIBUTING.md, ARCHITECTURE.md and docs/paper.md.
 A file may be named by the end of its path; one that the program writes is named by the sources. A symbol
 named in a numbered step must stand in a file that the step names; any other, somewhere in the sources. Names and
 phrases that were metaphors, and were replaced by terms of the field, must not come back.

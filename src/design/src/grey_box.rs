@@ -7,8 +7,8 @@
 //! own unknowns projected out.
 //!
 //! All modes are fitted together: a window may contain switches, across which the state carries on, and a row of `C`
-//! that is the same in several modes stays the same. This is what keeps the modes' states in common coordinates. `E` and `F` are
-//! fitted where the disturbance's period is known; else nothing tells their part from the level's.
+//! that is the same in several modes stays the same. This is what keeps the modes' states in common coordinates.
+//! `E` and `F` are fitted where the disturbance's period is known; else nothing tells their part from the level's.
 
 mod judgement;
 mod model;

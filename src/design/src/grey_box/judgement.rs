@@ -45,8 +45,8 @@ impl GreyBox<'_> {
         each.collect()
     }
 
-    /// Standard deviation of each sensor's noise (p) in each mode: what is left moves slowly but for it, so that it is what one
-    /// sample differs from the next by.
+    /// Standard deviation of each sensor's noise (p) in each mode: what is left moves slowly but for it, so that it
+    /// is what one sample differs from the next by.
     pub(super) fn noise(&self, windows: &[Window], theta: &DVector<f64>) -> Vec<DVector<f64>> {
         let p = self.deviation[0].len();
         let modes = self.matrices(theta);

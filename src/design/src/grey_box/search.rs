@@ -17,8 +17,8 @@ const LATE: f64 = 0.5;
 const KNOWN: f64 = 1e-6;
 
 impl GreyBox<'_> {
-    /// The parameters that explain the windows best, and the relative error of the model that is left. The maps to the outputs and those of
-    /// the disturbance are the design's unless the windows say otherwise: what is as probable without a
+    /// The parameters that explain the windows best, and the relative error of the model that is left. The maps to
+    /// the outputs and those of the disturbance are the design's unless the windows say otherwise: what is as probable without a
     /// change of theirs is not changed.
     pub(super) fn choose(&mut self, windows: &[Window], model_error: f64) -> (DVector<f64>, f64) {
         let prior = self.prior.clone();
