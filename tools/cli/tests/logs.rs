@@ -672,7 +672,10 @@ fn the_state_based_estimator_fits_its_model_to_the_log() {
     let example = std::path::Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../../examples"));
     let text = fs::read_to_string(example.join("logged.toml")).unwrap();
     let text = text
-        .replace("model_error = 0.05", "model_error = 0.1")
+        .replace(
+            "method = \"reference\"",
+            "method = \"observer\"\nmodel_error = 0.1",
+        )
         .replace("0.60, 0.0", "0.65, 0.0");
     let logs = ["logged_closed.csv", "logged_open.csv"]
         .map(|name| (name, fs::read_to_string(example.join(name)).unwrap()));
