@@ -28,7 +28,7 @@
 //! | `controller.bumpless`, `feedforward`, `internal_model` | false, true, false |
 //! | `observer.kind` | `auto` |
 //! | `observer.decay` | that of the controller |
-//! | `estimator.method`, `database` | `observer`, `commission` |
+//! | `estimator.method`, `database` | `observer` (`reference` where `database` names logs), `commission` |
 //! | `estimator.sigmas`, `debounce`, `stuck_after`, `adapt` | 6, 1 sample, 0 (never), false |
 //! | `estimator.authority` | the sensor's range `max - min`; without one 2.5 times its nominal value and twice its largest operating point |
 //! | `estimator.input_load` | a fifth of the input's nominal value |

@@ -24,12 +24,14 @@ pub(crate) fn estimator(
 ) -> Result<EstimatorSpec, String> {
     let usual = EstimatorSpec::default();
     let database = database(given, logs)?.unwrap_or(usual.database);
-    let method = match given.method {
-        None => usual.method,
-        Some(EstimatorMethod::Observer) => parameters::EstimatorMethod::Observer,
-        Some(EstimatorMethod::Reference) => parameters::EstimatorMethod::Reference,
-        Some(EstimatorMethod::Sliding) => parameters::EstimatorMethod::Sliding,
-        Some(EstimatorMethod::None) => parameters::EstimatorMethod::None,
+    let method = match (given.method, &database) {
+        // With a model that is right, such as an identified one, it accuses a sensor a sample earlier.
+        (None, DatabaseSource::Recorded(_)) => parameters::EstimatorMethod::Reference,
+        (None, _) => usual.method,
+        (Some(EstimatorMethod::Observer), _) => parameters::EstimatorMethod::Observer,
+        (Some(EstimatorMethod::Reference), _) => parameters::EstimatorMethod::Reference,
+        (Some(EstimatorMethod::Sliding), _) => parameters::EstimatorMethod::Sliding,
+        (Some(EstimatorMethod::None), _) => parameters::EstimatorMethod::None,
     };
     let response_length = match given.response_length {
         None => None,

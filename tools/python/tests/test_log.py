@@ -41,9 +41,7 @@ def test_a_plant_that_was_never_modelled_gets_an_fmu(tanks: ftc.Plant, tmp_path:
     assert found.coordinates == "switches"
     assert (found.fit > 95.0).all(), str(found)
     assert "<- chosen" in str(found)
-    # The default method takes a sample longer to accuse a sensor: a load explains the first one as well.
-    estimator = {"database": log, "method": "reference"}
-    design = ftc.design(found.plant, name="identified", tracked=[1, 2], decay=0.97, estimator=estimator)
+    design = ftc.design(found.plant, name="identified", tracked=[1, 2], decay=0.97, estimator={"database": log})
     controller = design.controller()
     random = np.random.default_rng(2)
     x, error = np.zeros(2), []
