@@ -74,6 +74,7 @@ period = {PERIOD}
 tracked = [1]
 decay = 0.95
 [estimator]
+method = "observer"
 database = "log.csv"
 model_error = {MODEL_ERROR}
 """
