@@ -6,9 +6,8 @@
 mod random_plants;
 
 use ftc_control::Controller;
-use ftc_plant::scenario::ModeInterval;
 use ftc_simulate::{PlantSimulator, Variant, run};
-use random_plants::{RandomNumbers, STEPS, design};
+use random_plants::{RandomNumbers, STEPS, design, schedule};
 
 /// Plants; each runs for [`STEPS`] samples. `cargo bench --bench detection` counts on twenty.
 const PLANTS: usize = 4;
@@ -22,12 +21,7 @@ fn no_healthy_sensor_is_flagged() {
     for plant in 0..PLANTS {
         let mut design = design(&mut random);
         let te = design.plant.sample_time;
-        design.scenario.schedule = (0..STEPS / EVERY)
-            .map(|k| ModeInterval {
-                from: (k * EVERY) as f64 * te,
-                mode: (k % 2) as usize,
-            })
-            .collect();
+        design.scenario.schedule = schedule(te, STEPS, EVERY);
         let simulator = PlantSimulator::new(design.plant.clone(), design.scenario.clone());
         let controller = Controller::new(design.parameters()).unwrap();
         let trajectory = run(&simulator, &controller, Variant::Ftc);

@@ -8,7 +8,7 @@ mod random_plants;
 use common::{Channel, REFERENCES, plant, reference, scenario, state_based};
 use ftc_control::{Controller, ControllerState};
 use ftc_design::Design;
-use ftc_plant::scenario::{ModeInterval, Waveform};
+use ftc_plant::scenario::Waveform;
 use ftc_plant::{SwitchedPlant, TruePlant};
 use ftc_simulate::{PlantSimulator, Trajectory, Variant, run};
 use proptest::prelude::*;
@@ -23,12 +23,7 @@ fn designs(seed: u64, count: usize) -> Vec<Design> {
         let mut design = random_plants::with_several_sensors(&mut random);
         let te = design.plant.sample_time;
         design.scenario.steps = STEPS;
-        design.scenario.schedule = (0..6)
-            .map(|at| ModeInterval {
-                from: 200.0 * at as f64 * te,
-                mode: at % 2,
-            })
-            .collect();
+        design.scenario.schedule = random_plants::schedule(te, STEPS, 200);
         design
     };
     (0..count).map(draw).collect()

@@ -468,7 +468,9 @@ fn no_library_crate_has_a_circle_of_modules() {
         let sources = Sources::read(&source.join(name).join("src"));
         let arrows = sources.arrows();
         let count: usize = arrows.values().map(BTreeSet::len).sum();
-        assert!(count > 0, "no arrows were found in {name}");
+        // What belongs together hangs together: of the modules below the root each but one has an arrow of its own.
+        let fewest = arrows.len().saturating_sub(2).max(1);
+        assert!(count >= fewest, "{count} arrows were found in {name}");
         if let Some(circle) = first_circle_of(&sources, arrows, root_only_names) {
             let _ = writeln!(
                 circles,

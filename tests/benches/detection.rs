@@ -7,22 +7,12 @@ mod random_plants;
 
 use ftc_control::Controller;
 use ftc_design::Design;
-use ftc_plant::scenario::{FaultEvent, FaultKind, ModeInterval};
+use ftc_plant::scenario::{FaultEvent, FaultKind};
 use ftc_simulate::{PlantSimulator, Variant, run};
-use random_plants::{RandomNumbers, design};
+use random_plants::{RandomNumbers, design, schedule};
 
 const PLANTS: usize = 20;
 const FAULTS_PER_PLANT: usize = 10;
-
-/// Alternating modes, so that switches happen with and without a fault.
-fn schedule(te: f64, steps: u64, every: u64) -> Vec<ModeInterval> {
-    (0..steps / every)
-        .map(|k| ModeInterval {
-            from: (k * every) as f64 * te,
-            mode: (k % 2) as usize,
-        })
-        .collect()
-}
 
 #[derive(Default)]
 struct Tally {

@@ -5,7 +5,7 @@ use ftc_control::parameters::EstimatorMethod;
 use ftc_design::assembly::{KnownDisturbance, Request, assemble};
 use ftc_design::{ControlSpec, Design, Lyapunov, ObserverChoice, ObserverSpec, Signals};
 use ftc_plant::Scenario;
-use ftc_plant::scenario::Waveform;
+use ftc_plant::scenario::{ModeInterval, Waveform};
 use ftc_plant::{Mode, SwitchedPlant, spectral_radius};
 use nalgebra::DMatrix;
 use rand_chacha::ChaCha8Rng;
@@ -47,6 +47,16 @@ fn mode(random: &mut RandomNumbers, n: usize, m: usize, p: usize, output: &DMatr
     )
     .named("random")
     .with_disturbance(random.matrix(n, 1) * 0.3, DMatrix::zeros(p, 1))
+}
+
+/// Alternating modes, so that switches happen with and without a fault.
+pub fn schedule(te: f64, steps: u64, every: u64) -> Vec<ModeInterval> {
+    (0..steps / every)
+        .map(|k| ModeInterval {
+            from: (k * every) as f64 * te,
+            mode: (k % 2) as usize,
+        })
+        .collect()
 }
 
 /// A random plant with a certified design; draws until one exists.

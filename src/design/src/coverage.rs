@@ -290,8 +290,8 @@ fn check_estimator(design: &Design) -> Result<(), CoverageError> {
 }
 
 /// The sizes and rates of the state-based estimator follow from the plant, the signals, and what
-/// the user may choose: model error, fault rate and length, authority, loads, policy, mode length, disturbance; what logs say
-/// (matrices, noise) is theirs.
+/// the user may choose: model error, fault rate and length, authority, loads, policy, mode length, disturbance;
+/// what logs say (matrices, noise) is theirs.
 fn hypotheses_fit(design: &Design) -> bool {
     let estimator = &design.controller.estimator;
     let Some(found) = &estimator.hypotheses else {

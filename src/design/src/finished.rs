@@ -1,8 +1,7 @@
 //! A finished design: its record and what proves it.
 
 use super::{Proof, Synthesis};
-use ftc_plant::{Scenario, SwitchedPlant};
-use ftc_record::{ControllerDesign, DesignRecord, Signals};
+use ftc_record::DesignRecord;
 use serde::{Deserialize, Serialize};
 use std::ops::{Deref, DerefMut};
 
@@ -19,18 +18,6 @@ pub struct Design {
 }
 
 impl Design {
-    /// A controller that was not made by synthesis, and so has no proof, for a plant that is as it was
-    /// designed for.
-    pub fn new(
-        name: &str,
-        plant: SwitchedPlant,
-        signals: Signals,
-        controller: ControllerDesign,
-        scenario: Scenario,
-    ) -> Self {
-        DesignRecord::new(name, plant, signals, controller, scenario).into()
-    }
-
     /// The gains and the observer that run, with what proves them; none where they were not made by
     /// synthesis.
     pub fn synthesis(&self) -> Option<Synthesis> {

@@ -2,6 +2,7 @@
 
 use crate::histogram::Histogram;
 use crate::run::Outcome;
+use report::robustness::WORSE;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
@@ -81,7 +82,7 @@ impl Healthy {
         self.runs += 1;
         self.error.add(error);
         self.over_none.add(over_none);
-        self.worse_than_none += u64::from(over_none > 1.0 + report::robustness::WORSE);
+        self.worse_than_none += u64::from(over_none > 1.0 + WORSE);
         self.flagged += u64::from(flagged);
     }
 
@@ -155,7 +156,7 @@ impl Statistics {
             self.healthy.add(with, over_none, flagged);
         } else {
             self.faulty_runs += 1;
-            self.worse_than_none += u64::from(over_none > 1.0 + report::robustness::WORSE);
+            self.worse_than_none += u64::from(over_none > 1.0 + WORSE);
         }
         if let Some((mode, radius)) = outcome.unstable {
             let run = outcome.run;

@@ -6,7 +6,7 @@ use super::simulate::{Extent, SimulateError, TableOfSamples};
 use super::{Digest, demo, svg};
 use ftc_control::parameters::{Compensation, Estimator, FeedbackGains, Observer, StateFeedback};
 use ftc_control::{Controller, Matrix};
-use ftc_design::{ControllerDesign, Design, Signal, Signals};
+use ftc_design::{ControllerDesign, Design, DesignRecord, Signal, Signals};
 use ftc_plant::scenario::{FaultEvent, FaultKind, ModeInterval, Waveform};
 use ftc_plant::{Mode, Scenario, SwitchedPlant};
 use ftc_simulate::{PlantSimulator, Variant, run};
@@ -36,7 +36,7 @@ fn paper(noise: f64) -> Design {
     let plant = common::plant(common::Channel::State);
     let signals = Signals::numbered(plant.dimensions());
     let scenario = common::scenario(common::reference("levels"), noise, 1);
-    Design::new("paper", plant, signals, controller, scenario)
+    DesignRecord::new("paper", plant, signals, controller, scenario).into()
 }
 
 /// A plant of first-order lags in any size, with a proportional-integral controller and no estimator.
@@ -104,7 +104,7 @@ fn lags(outputs: usize, disturbances: usize, steps: u64) -> Design {
         };
         disturbances
     ];
-    Design::new("lags", plant, signals, controller, scenario)
+    DesignRecord::new("lags", plant, signals, controller, scenario).into()
 }
 
 fn hostile(mut design: Design) -> Design {
