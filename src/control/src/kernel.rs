@@ -152,28 +152,41 @@ pub fn dot(left: &[f64], right: &[f64]) -> f64 {
 /// Inner products of four vectors with another one, each in four sums side by side, for long vectors: no
 /// addition waits for the one before it. Their order is fixed too. All have `right`'s length, a multiple
 /// of four.
+///
+/// In pairs, as the processor's registers hold them: of four in one array the compiler may make one, two
+/// and one, which takes a quarter more instructions.
 pub fn four_dots(left: [&[f64]; 4], right: &[f64]) -> [f64; 4] {
-    let [a, b, c, d] = left.map(|vector| vector.as_chunks::<4>().0);
-    let mut sums = [[0.0; 4]; 4];
-    let add = |sum: &mut [f64; 4], l: &[f64; 4], r: &[f64; 4]| {
-        for (sum, (l, r)) in sum.iter_mut().zip(l.iter().zip(r)) {
+    let [a, b, c, d] = left.map(fours);
+    let mut sums = [[[0.0; 2]; 2]; 4];
+    let left = a.iter().zip(b).zip(c.iter().zip(d));
+    for (((a, b), (c, d)), right) in left.zip(fours(right)) {
+        add_pairs(&mut sums[0], a, right);
+        add_pairs(&mut sums[1], b, right);
+        add_pairs(&mut sums[2], c, right);
+        add_pairs(&mut sums[3], d, right);
+    }
+    totals(sums)
+}
+
+/// Four entries as two pairs.
+type Four = [[f64; 2]; 2];
+
+fn fours(vector: &[f64]) -> &[Four] {
+    vector.as_chunks().0.as_chunks().0
+}
+
+fn add_pairs(sums: &mut Four, left: &Four, right: &Four) {
+    for (sum, (left, right)) in sums.iter_mut().zip(left.iter().zip(right)) {
+        for (sum, (l, r)) in sum.iter_mut().zip(left.iter().zip(right)) {
             *sum += l * r;
         }
-    };
-    let left = a.iter().zip(b).zip(c.iter().zip(d));
-    for (((a, b), (c, d)), right) in left.zip(right.as_chunks::<4>().0) {
-        add(&mut sums[0], a, right);
-        add(&mut sums[1], b, right);
-        add(&mut sums[2], c, right);
-        add(&mut sums[3], d, right);
     }
-    totals(&sums)
 }
 
 /// Apart, so that the sums before it are not interleaved for its sake.
 #[inline(never)]
-fn totals(sums: &[[f64; 4]; 4]) -> [f64; 4] {
-    sums.map(|[a, b, c, d]| (a + c) + (b + d))
+fn totals(sums: [Four; 4]) -> [f64; 4] {
+    sums.map(|[[a, b], [c, d]]| (a + c) + (b + d))
 }
 
 #[cfg(test)]
