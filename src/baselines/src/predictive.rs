@@ -16,7 +16,7 @@
 
 use ftc_control::parameters::Limits;
 use ftc_design::quadratic::{QuadraticProgram, RefusedProgram};
-use ftc_design::riccati;
+use ftc_design::{riccati, steady_state};
 use ftc_plant::{Mode, SwitchedPlant};
 use ftc_simulate::closed_loop::{Regulator, Report};
 use ftc_simulate::plant::PlantState;
@@ -105,12 +105,6 @@ pub enum PredictiveCause {
     /// The solver refuses the quadratic programme.
     #[error(transparent)]
     Programme(#[from] RefusedProgram),
-    /// The steady state cannot be computed.
-    #[error("the equations of the steady state cannot be inverted")]
-    SteadyState,
-    /// The Kalman filter cannot be computed.
-    #[error("the filter's innovation covariance is singular")]
-    SingularInnovation,
     /// A Riccati equation has no solution.
     #[error("the Riccati equation has no solution: the mode cannot be stabilised")]
     NotStabilisable,
@@ -244,7 +238,6 @@ impl Planner {
         let repeat = DMatrix::from_fn(hessian.nrows(), m, |row, column| {
             f64::from(row % m == column)
         });
-        let select = mode.c.select_rows(&spec.tracked);
         Ok(Self {
             program: QuadraticProgram::new(
                 &hessian,
@@ -253,7 +246,7 @@ impl Planner {
             // The plan is in deviations from u0, the cost in deviations from u_s.
             from_input: -(&hessian * repeat),
             from_state: pull,
-            target: steady_state(&mode.a, &mode.b, &select)?,
+            target: steady_state(mode, &spec.tracked),
             kalman: kalman(plant, index, spec)?,
             inputs: m,
         })
@@ -336,27 +329,6 @@ fn bounds(horizon: usize, u0: &[f64], limits: &[Limits]) -> Vec<Limits> {
     (0..horizon).flat_map(|_| inputs.clone()).collect()
 }
 
-/// `[x_s; u_s]` as a linear function of the wanted tracked outputs: least squares of
-/// `(A - I) x_s + B u_s = 0`, `S C x_s = wanted`.
-fn steady_state(
-    a: &DMatrix<f64>,
-    b: &DMatrix<f64>,
-    select: &DMatrix<f64>,
-) -> Result<DMatrix<f64>, PredictiveCause> {
-    let (n, m) = b.shape();
-    let r = select.nrows();
-    let mut equations = DMatrix::zeros(n + r, n + m);
-    equations
-        .view_mut((0, 0), (n, n))
-        .copy_from(&(a - DMatrix::identity(n, n)));
-    equations.view_mut((0, n), (n, m)).copy_from(b);
-    equations.view_mut((n, 0), (r, n)).copy_from(select);
-    let inverse = equations
-        .pseudo_inverse(1e-12)
-        .map_err(|_| PredictiveCause::SteadyState)?;
-    Ok(inverse.columns(n, r).into_owned())
-}
-
 /// Gain of the steady Kalman filter of `[x; d]`: the disturbance drives the state, and `d` wanders
 /// by a noise deviation each sample.
 fn kalman(
@@ -380,14 +352,7 @@ fn kalman(
     let mut process = DMatrix::identity(n + p, n + p) * floor;
     process.view_mut((0, 0), (n, n)).add_assign(&driven);
     process.view_mut((n, n), (p, p)).copy_from(&variance);
-    let reach = c.transpose() * DMatrix::from_diagonal(&variances.map(f64::recip)) * &c;
-    let covariance =
-        riccati::solve(&a.transpose(), &reach, &process).ok_or(PredictiveCause::NotStabilisable)?;
-    let innovation = &c * &covariance * c.transpose() + variance;
-    let inverse = innovation
-        .try_inverse()
-        .ok_or(PredictiveCause::SingularInnovation)?;
-    Ok(covariance * c.transpose() * inverse)
+    riccati::filter_gain(&a, &c, &process, &variance).ok_or(PredictiveCause::NotStabilisable)
 }
 
 #[cfg(test)]

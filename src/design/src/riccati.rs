@@ -28,6 +28,23 @@ pub fn solve(a: &DMatrix<f64>, g: &DMatrix<f64>, h: &DMatrix<f64>) -> Option<DMa
     })
 }
 
+/// The stationary Kalman filter's gain in correction form, `P c' (c P c' + sensor)^-1` (n x p), with `P` the
+/// covariance of the prediction, for the covariances of process (n x n) and sensor (p x p, positive
+/// definite) noise; `None` where there is none.
+pub fn filter_gain(
+    a: &DMatrix<f64>,
+    c: &DMatrix<f64>,
+    process: &DMatrix<f64>,
+    sensor: &DMatrix<f64>,
+) -> Option<DMatrix<f64>> {
+    let weighted = sensor.clone().cholesky()?.solve(c);
+    let reach = symmetric(c.transpose() * weighted);
+    let covariance = solve(&a.transpose(), &reach, process)?;
+    let innovation = symmetric(c * &covariance * c.transpose() + sensor);
+    let gain = innovation.cholesky()?.solve(&(c * covariance));
+    Some(gain.transpose())
+}
+
 /// `X = a' X a + h` for a stable `a`: the sum of `a'^k h a^k`; `None` where it does not converge.
 pub(crate) fn lyapunov(a: &DMatrix<f64>, h: &DMatrix<f64>) -> Option<DMatrix<f64>> {
     let mut a = a.clone();

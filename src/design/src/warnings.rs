@@ -6,6 +6,7 @@ use crate::Design;
 use crate::apart::{self, Apart};
 use crate::assembly::DatabaseSource;
 use crate::commissioning::{Database, model_predictor};
+use crate::steady_state::steady_state;
 use ftc_control::Matrix;
 use ftc_control::estimator::leverage;
 use ftc_control::parameters::{Estimator, EstimatorMethod, Predictor};
@@ -241,20 +242,9 @@ struct Steady<'a> {
 }
 
 impl<'a> Steady<'a> {
-    fn new(mode: &'a Mode, predictor: &Predictor, tracked: &'a [usize]) -> Option<Self> {
+    fn new(mode: &'a Mode, predictor: &Predictor, tracked: &'a [usize]) -> Self {
         let (n, m) = mode.b.shape();
-        let r = tracked.len();
-        let mut system = DMatrix::zeros(n + r, n + m);
-        system
-            .view_mut((0, 0), (n, n))
-            .copy_from(&(&mode.a - DMatrix::identity(n, n)));
-        system.view_mut((0, n), (n, m)).copy_from(&mode.b);
-        for (row, &output) in tracked.iter().enumerate() {
-            system
-                .view_mut((n + row, 0), (1, n))
-                .copy_from(&mode.c.row(output));
-        }
-        let inverse = system.pseudo_inverse(1e-12).ok()?;
+        let rest = steady_state(mode, tracked);
         let size = predictor.factor.nrows();
         let mut spread = DMatrix::zeros(size, m);
         for input in 0..m {
@@ -265,12 +255,12 @@ impl<'a> Steady<'a> {
             leverage(&predictor.factor, &held, &mut whitened);
             spread.column_mut(input).copy_from_slice(&whitened);
         }
-        Some(Self {
+        Self {
             mode,
             tracked,
-            gain: inverse.view((n, n), (m, r)).into_owned(),
+            gain: rest.rows(n, m).into_owned(),
             spread,
-        })
+        }
     }
 
     /// The input `u` (m) and its leverage; an input stays within its limits.
@@ -295,14 +285,14 @@ fn outside_the_database(design: &Design) -> Vec<Warning> {
     let controller = &design.controller;
     let (scenario, te) = (&design.scenario, design.plant.sample_time);
     let modes = design.plant.modes.iter();
-    let steady: Vec<Option<Steady>> = modes
+    let steady: Vec<Steady> = modes
         .zip(&controller.estimator.predictors)
         .map(|(mode, predictor)| Steady::new(mode, predictor, &controller.feedback.tracked))
         .collect();
     let mut worst: Vec<Option<(DVector<f64>, f64)>> = vec![None; steady.len()];
     for tick in 0..scenario.steps {
         let mode = scenario.mode(tick, te);
-        let Some(Some(steady)) = steady.get(mode) else {
+        let Some(steady) = steady.get(mode) else {
             continue;
         };
         let reference: Vec<f64> = scenario.reference.iter().map(|r| r.at(tick, te)).collect();

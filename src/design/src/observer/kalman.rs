@@ -77,11 +77,7 @@ impl Filtered {
         for (k, &row) in kept.iter().enumerate() {
             sensor[(k, k)] += (ratio * self.noise[row]).powi(2);
         }
-        let weighted = sensor.clone().cholesky()?.solve(&c);
-        let reach = riccati::symmetric(c.transpose() * weighted);
-        let covariance = riccati::solve(&self.a.transpose(), &reach, &self.process)?;
-        let innovation = riccati::symmetric(&c * &covariance * c.transpose() + sensor);
-        let found = innovation.cholesky()?.solve(&(&c * covariance)).transpose();
+        let found = riccati::filter_gain(&self.a, &c, &self.process, &sensor)?;
         for (k, &column) in kept.iter().enumerate() {
             gain.set_column(column, &found.column(k));
         }
