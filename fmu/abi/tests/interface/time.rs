@@ -415,7 +415,7 @@ fn points_rounded_to_four_digits_never_run_ahead_of_their_inputs() {
     let mut clock = Clock::new(1.0 / 30.0);
     clock.set_up(0.0, None).unwrap();
     for k in 0..100_000 {
-        let before = clock.clone();
+        let before = clock;
         let step = rounded(k + 1) - rounded(k);
         clock.advance(rounded(k), step).unwrap();
         let events: Vec<_> = std::iter::from_fn(|| clock.next_event()).collect();
