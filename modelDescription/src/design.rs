@@ -79,6 +79,11 @@ fn check_nesting(bytes: &[u8]) -> Result<(), DesignFileError> {
             continue;
         }
         *left -= 1;
+        let at = decoder.position();
+        if let Some(length) = bytes.get(at..).and_then(plain_length) {
+            decoder.set_position(at + length);
+            continue;
+        }
         let values = match decoder.datatype()? {
             Type::Array => decoder.array()?,
             Type::Map => decoder.map()?.map(|entries| entries.saturating_mul(2)),
@@ -94,6 +99,32 @@ fn check_nesting(bytes: &[u8]) -> Result<(), DesignFileError> {
         }
     }
     Ok(())
+}
+
+/// How many bytes a number, a text or a string of bytes takes at the beginning of these, which are not read
+/// here; none where something else begins, or less is there.
+fn plain_length(bytes: &[u8]) -> Option<usize> {
+    let (&first, rest) = bytes.split_first()?;
+    let width = match first & 0x1f {
+        0..=23 => 0,
+        24 => 1,
+        25 => 2,
+        26 => 4,
+        27 => 8,
+        _ => return None,
+    };
+    let content = match (first >> 5, width) {
+        (0 | 1 | 7, _) => 0,
+        (2 | 3, 0) => usize::from(first & 0x1f),
+        (2 | 3, _) => {
+            let bytes = rest.get(..width)?.iter();
+            let count = bytes.fold(0, |count: u64, &byte| count << 8 | u64::from(byte));
+            usize::try_from(count).ok()?
+        }
+        _ => return None,
+    };
+    let length = content.checked_add(1 + width)?;
+    (length <= bytes.len()).then_some(length)
 }
 
 fn decode<'a, R: Deserialize<'a>>(bytes: &'a [u8]) -> Result<R, DesignFileError> {
@@ -188,6 +219,70 @@ impl Interface {
             modes: plant.modes.len(),
             finds_the_mode: design.controller.estimator.finds_the_mode(),
             thresholds: design.controller.estimator.thresholds.clone(),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    /// The depth of the lists and maps as the decoder alone finds it, text by text.
+    fn depth(decoder: &mut Decoder<'_>, within: usize) -> Option<usize> {
+        let values = match decoder.datatype().ok()? {
+            Type::Array => decoder.array().ok()??,
+            Type::Map => decoder.map().ok()??.checked_mul(2)?,
+            Type::ArrayIndef | Type::MapIndef => return None,
+            _ => return decoder.skip().ok().map(|()| within),
+        };
+        let mut deepest = within + 1;
+        for _ in 0..values {
+            deepest = deepest.max(depth(decoder, within + 1)?);
+        }
+        Some(deepest)
+    }
+
+    /// A value of CBOR in lists and maps, and now and then a byte of it changed.
+    fn bytes() -> impl Strategy<Value = Vec<u8>> {
+        let leaf = prop_oneof![
+            Just(vec![0x17]),
+            Just(vec![0x19, 1, 2]),
+            Just(vec![0x3b, 1, 2, 3, 4, 5, 6, 7, 8]),
+            Just(vec![0xfb, 1, 2, 3, 4, 5, 6, 7, 8]),
+            Just(vec![0xf5]),
+            Just(vec![0x62, b'o', b'k']),
+            Just(vec![0x58, 3, 0x81, 0x81, 0x81]),
+        ];
+        let value = leaf.prop_recursive(40, 200, 3, |inner| {
+            prop::collection::vec(inner, 0..4).prop_map(|values| {
+                let mut bytes = vec![0x80 | values.len() as u8];
+                bytes.extend(values.into_iter().flatten());
+                bytes
+            })
+        });
+        let wrapped = (value, 0_usize..40).prop_map(|(value, lists)| {
+            let mut bytes = vec![0x81; lists];
+            bytes.extend(value);
+            bytes
+        });
+        let changed = prop::option::weighted(0.3, any::<(prop::sample::Index, u8)>());
+        (wrapped, changed).prop_map(|(mut bytes, changed)| {
+            if let Some((at, byte)) = changed {
+                let at = at.index(bytes.len());
+                bytes[at] = byte;
+            }
+            bytes
+        })
+    }
+
+    proptest! {
+        /// Values are passed over without being read, and the lists are found as deep as they are.
+        #[test]
+        fn nesting_is_what_the_decoder_finds(bytes in bytes()) {
+            if let Some(depth) = depth(&mut Decoder::new(&bytes), 0) {
+                prop_assert_eq!(check_nesting(&bytes).is_ok(), depth <= MOST_NESTED);
+            }
         }
     }
 }

@@ -43,7 +43,7 @@ const LAST_PLACES: f64 = 4.0;
 pub const MOST_TICKS: u64 = 100_000;
 
 /// Where an instance stands in time. Plain data: it is part of a saved state.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Clock {
     sample_time: f64,
     start: f64,
@@ -156,7 +156,7 @@ impl Clock {
         self.now
     }
 
-    /// The clock after a step of length `step` from communication point `from`.
+    /// Makes a step of length `step` from communication point `from`; a refusal changes nothing.
     ///
     /// The events of the step are then had from [`Clock::next_event`]. A step of more than
     /// [`MOST_TICKS`] ticks ends after as many.
@@ -164,15 +164,21 @@ impl Clock {
     /// # Errors
     /// A step that is not positive and finite (the standard asks for more than 0), a point that
     /// does not continue the last, a step beyond the stop time.
-    pub fn advanced(&self, from: f64, step: f64) -> Result<Self, TimeError> {
+    #[inline]
+    pub fn advance(&mut self, from: f64, step: f64) -> Result<(), TimeError> {
+        if self.is_one_tick(from, step) {
+            (self.now, self.wanted) = (from + step, from + step);
+            (self.steps, self.ticks) = (self.steps + 1, self.ticks + 1);
+            return Ok(());
+        }
+        self.advance_anyhow(from, step)
+    }
+
+    /// The same for a step that is not just one tick.
+    #[inline(never)]
+    fn advance_anyhow(&mut self, from: f64, step: f64) -> Result<(), TimeError> {
         if !(step.is_finite() && step > 0.0) {
             return Err(TimeError::Step(step));
-        }
-        if self.is_one_tick(from, step) {
-            let mut next = self.clone();
-            (next.now, next.wanted) = (from + step, from + step);
-            (next.steps, next.ticks) = (self.steps + 1, self.ticks + 1);
-            return Ok(next);
         }
         let resolution = LAST_PLACES * ulp(from) / self.sample_time;
         let gap = |last: f64| ((from - last) / self.sample_time).abs();
@@ -195,10 +201,9 @@ impl Clock {
         } else {
             (to, length)
         };
-        let mut next = self.clone();
-        (next.now, next.wanted, next.steps) = (to, to, self.steps + 1);
-        next.move_on(length, resolution);
-        Ok(next)
+        (self.now, self.wanted, self.steps) = (to, to, self.steps + 1);
+        self.move_on(length, resolution);
+        Ok(())
     }
 
     /// Whether a step goes from the beginning of a tick to its end, but for a rounding error that
@@ -258,15 +263,16 @@ impl Clock {
     /// The next event up to now; `None` when all have happened.
     #[inline]
     pub fn next_event(&mut self) -> Option<Event> {
-        let ended = self.complete();
-        if self.begun == self.ended && self.begins_tick() {
-            self.begun += 1;
-            Some(Event::Begin(self.begun - 1))
-        } else if self.ended < self.begun.min(ended) {
-            self.ended += 1;
-            Some(Event::End(self.ended - 1))
+        if self.begun == self.ended {
+            self.begins_tick().then(|| {
+                self.begun += 1;
+                Event::Begin(self.begun - 1)
+            })
         } else {
-            None
+            self.ends_tick().then(|| {
+                self.ended += 1;
+                Event::End(self.ended - 1)
+            })
         }
     }
 
@@ -281,7 +287,7 @@ impl Clock {
 
     /// Whether all that has come by now has happened, as between two steps.
     pub fn is_at_rest(&self) -> bool {
-        self.clone().next_event().is_none()
+        { *self }.next_event().is_none()
     }
 
     /// Whether this is a clock with ticks of `sample_time` seconds; one that came as bytes may

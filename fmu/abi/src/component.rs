@@ -309,12 +309,13 @@ impl<S: Slave> Component<S> {
         convert: impl Fn(f64) -> Option<T>,
     ) -> Outcome {
         self.refresh()?;
-        if self.common(references) & Mark::typed(base) == 0 {
+        if self.marks_of(references).0 & Mark::typed(base) == 0 {
             self.check_types(references, base)?;
         }
         for (&reference, slot) in references.iter().zip(out) {
-            let value = self.current.values.at(reference).unwrap_or_default();
-            *slot = convert(value).ok_or_else(|| self.not_of(base, reference, value))?;
+            if let Some(value) = self.current.values.at(reference) {
+                *slot = convert(value).ok_or_else(|| self.not_of(base, reference, value))?;
+            }
         }
         Ok(())
     }
@@ -329,11 +330,12 @@ impl<S: Slave> Component<S> {
         Ok(())
     }
 
-    /// The marks that all of these variables have; none where one does not exist.
+    /// The marks that all of these variables have, none where one does not exist, and those that one has.
     #[inline]
-    fn common(&self, references: &[ValueReference]) -> u16 {
+    fn marks_of(&self, references: &[ValueReference]) -> (u16, u16) {
         let mark = |&reference| self.marks.get(reference as usize).map_or(0, |mark| mark.0);
-        references.iter().fold(u16::MAX, |all, it| all & mark(it))
+        let marks = references.iter().map(mark);
+        marks.fold((u16::MAX, 0), |(all, any), it| (all & it, any | it))
     }
 
     /// Sets values of one type; nothing is set from a call with one bad entry.
@@ -346,19 +348,17 @@ impl<S: Slave> Component<S> {
     ) -> Outcome {
         let phase = self.phase();
         let free = Mark::typed(base) | phase as u16;
-        if self.common(references) & free != free {
+        let (all, any) = self.marks_of(references);
+        if all & free != free {
             self.check_each(base, references, values, &convert)?;
         }
-        let mut marks = 0;
         for (&reference, &value) in references.iter().zip(values) {
-            let mark = self.marks.get(reference as usize);
-            if let (Some(slot), Some(mark)) = (self.current.values.slot(reference), mark) {
+            if let Some(slot) = self.current.values.slot(reference) {
                 *slot = convert(value);
-                marks |= mark.0;
             }
         }
-        self.current.handed_over |= marks & Mark::INPUT != 0;
-        if marks & Mark::NOT_LATCHED != 0 {
+        self.current.handed_over |= any & Mark::INPUT != 0;
+        if any & Mark::NOT_LATCHED != 0 {
             self.current.values.unsettle();
         }
         self.current.stale = phase == State::InitializationMode;
@@ -402,8 +402,8 @@ impl<S: Slave> Component<S> {
     /// A step that is refused, by the clock or for its inputs, changes nothing. One of too many
     /// ticks is done in part and then discarded.
     pub fn step(&mut self, from: f64, length: f64) -> Outcome {
-        let next = self.current.clock.advanced(from, length)?;
-        let before = std::mem::replace(&mut self.current.clock, next);
+        let before = self.current.clock;
+        self.current.clock.advance(from, length)?;
         let waits = match self.prepare() {
             Ok(waits) => waits,
             Err(failure) => {

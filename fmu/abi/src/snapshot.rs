@@ -66,7 +66,7 @@ pub struct Snapshot<T> {
 impl<T: Clone> Clone for Snapshot<T> {
     fn clone(&self) -> Self {
         Self {
-            clock: self.clock.clone(),
+            clock: self.clock,
             values: self.values.clone(),
             state: self.state.clone(),
             ..*self
@@ -78,7 +78,7 @@ impl<T: Clone> Clone for Snapshot<T> {
         (self.phase, self.set_up) = (source.phase, source.set_up);
         (self.stale, self.provisional) = (source.stale, source.provisional);
         self.handed_over = source.handed_over;
-        self.clock.clone_from(&source.clock);
+        self.clock = source.clock;
         self.values.clone_from(&source.values);
         self.state.clone_from(&source.state);
     }

@@ -94,9 +94,6 @@ impl PlantFmu {
 
     fn injected<'a>(&self, values: &'a Values) -> Injected<'a> {
         let spans = self.spans.injected;
-        if values.get(spans[0]).iter().all(|&kind| kind == 0.0) {
-            return Injected::default();
-        }
         let [kind, size, from, until] = spans.map(|span| values.get(span));
         Injected {
             kind,
@@ -109,16 +106,27 @@ impl PlantFmu {
     /// Observes the present tick, faults from outside included.
     fn observe(&self, state: &mut PlantState, values: &mut Values) {
         self.simulator.observe(state, &self.external(values));
-        self.simulator.inject(state, &self.injected(values));
+        let kinds = values.get(self.spans.injected[0]);
+        if kinds.iter().all(|&kind| kind == 0.0) {
+            self.simulator.inject(state, &Injected::default());
+        } else {
+            self.simulator.inject(state, &self.injected(values));
+        }
         values.settle();
     }
 
     /// Refuses commands and disturbances that are no finite numbers.
+    #[inline]
     fn require_numbers(&self, values: &Values) -> Result<(), Refusal> {
         require_finite(&self.table, values, self.spans.command)?;
         if values.are_settled() {
             return Ok(());
         }
+        self.require_other_numbers(values)
+    }
+
+    #[inline(never)]
+    fn require_other_numbers(&self, values: &Values) -> Result<(), Refusal> {
         require_finite(&self.table, values, self.spans.external_disturbance)?;
         for span in self.spans.injected {
             require_finite(&self.table, values, span)?;

@@ -138,6 +138,7 @@ pub fn difference(out: &mut [f64], left: &[f64], right: &[f64]) {
 }
 
 /// Copies as many entries as both hold.
+#[inline]
 pub fn copy(out: &mut [f64], source: &[f64]) {
     for (to, &from) in out.iter_mut().zip(source) {
         *to = from;

@@ -23,8 +23,8 @@ const IN_A_BLOCK: usize = 8;
 
 /// [`standard_normal`] for one seed, prepared: the same numbers to the bit for a quarter of the work.
 ///
-/// The generator makes four blocks of the cipher at a time, of which a sample needs one; here it is
-/// made alone. The usual draw of the ziggurat is one product and one comparison; where a
+/// The generator makes four blocks of the cipher at a time, of which a sample needs one; here one is made
+/// for each of two ticks, side by side, since each step of the cipher waits for the one before it. The usual draw of the ziggurat is one product and one comparison; where a
 /// number needs another one, all of the tick are drawn by [`standard_normal`].
 #[derive(Clone, Debug)]
 pub struct Noise {
@@ -62,19 +62,24 @@ impl Noise {
         }
     }
 
-    /// Fills `out` with independent standard normal numbers belonging to `tick`.
-    pub fn draw(&self, tick: u64, out: &mut [f64]) {
-        if !self.draw_usual(tick, out) {
-            standard_normal(self.seed, tick, out);
+    /// Fills the first of `out` with independent standard normal numbers belonging to `tick`, the second with
+    /// those of the next.
+    pub fn draw(&self, tick: u64, out: [&mut [f64]; 2]) {
+        let ticks = [tick, tick.wrapping_add(1)];
+        let blocks = self.blocks(ticks);
+        for ((tick, bits), out) in ticks.into_iter().zip(blocks).zip(out) {
+            if !self.draw_usual(bits, out) {
+                standard_normal(self.seed, tick, out);
+            }
         }
     }
 
-    /// The same where one block is enough and each number is its first draw; says whether that is so.
-    fn draw_usual(&self, tick: u64, out: &mut [f64]) -> bool {
+    /// The numbers of a block, where one is enough and each is its first draw; says whether that is so.
+    #[inline]
+    fn draw_usual(&self, bits: [u64; IN_A_BLOCK], out: &mut [f64]) -> bool {
         if out.len() > IN_A_BLOCK {
             return false;
         }
-        let bits = self.block(tick);
         let mut usual = true;
         for (value, bits) in out.iter_mut().zip(bits) {
             let layer = (bits & 0xff) as usize;
@@ -90,38 +95,46 @@ impl Noise {
         usual
     }
 
-    /// The first block of ChaCha with eight rounds of this stream, in words of 64 bits.
-    fn block(&self, stream: u64) -> [u64; IN_A_BLOCK] {
+    /// The first block of ChaCha with eight rounds of each of these streams, in words of 64 bits.
+    #[inline]
+    fn blocks(&self, streams: [u64; 2]) -> [[u64; IN_A_BLOCK]; 2] {
         // SAFETY: every processor that this is compiled for has these instructions.
         #[cfg_attr(
             not(target_arch = "x86_64"),
             expect(unused_unsafe, reason = "none are asked for")
         )]
         unsafe {
-            self.rounds(stream)
+            self.rounds(streams)
         }
     }
 
     #[inline]
     #[cfg_attr(target_arch = "x86_64", target_feature(enable = "sse2"))]
-    fn rounds(&self, stream: u64) -> [u64; IN_A_BLOCK] {
-        let counters = [0, 0, stream as u32, (stream >> 32) as u32];
+    fn rounds(&self, streams: [u64; 2]) -> [[u64; IN_A_BLOCK]; 2] {
         let [constants, low, high] = self.rows;
         let (constants, low, high) = (Row::of(constants), Row::of(low), Row::of(high));
-        let counters = Row::of(counters);
-        let (mut a, mut b, mut c, mut d) = (constants, low, high, counters);
+        let start = streams.map(|stream| {
+            let counters = [0, 0, stream as u32, (stream >> 32) as u32];
+            [constants, low, high, Row::of(counters)]
+        });
+        let mut states = start;
         for _ in 0..4 {
-            [a, b, c, d] = quarters([a, b, c, d]);
-            (b, c, d) = (b.turned::<0x39>(), c.turned::<0x4e>(), d.turned::<0x93>());
-            [a, b, c, d] = quarters([a, b, c, d]);
-            (b, c, d) = (b.turned::<0x93>(), c.turned::<0x4e>(), d.turned::<0x39>());
+            for state in &mut states {
+                let [a, b, c, d] = quarters(*state);
+                let (b, c, d) = (b.turned::<0x39>(), c.turned::<0x4e>(), d.turned::<0x93>());
+                let [a, b, c, d] = quarters([a, b, c, d]);
+                let (b, c, d) = (b.turned::<0x93>(), c.turned::<0x4e>(), d.turned::<0x39>());
+                *state = [a, b, c, d];
+            }
         }
-        let mut words = [0; IN_A_BLOCK];
-        let rows = [(a, constants), (b, low), (c, high), (d, counters)];
-        for (two, (row, start)) in words.as_chunks_mut::<2>().0.iter_mut().zip(rows) {
-            *two = row.plus(start).words();
+        let mut blocks = [[0; IN_A_BLOCK]; 2];
+        for ((words, state), start) in blocks.iter_mut().zip(states).zip(start) {
+            let rows = state.into_iter().zip(start);
+            for (two, (row, start)) in words.as_chunks_mut::<2>().0.iter_mut().zip(rows) {
+                *two = row.plus(start).words();
+            }
         }
-        words
+        blocks
     }
 }
 
@@ -270,10 +283,11 @@ mod tests {
         fn prepared_noise_is_the_same_noise(seed: u64, tick: u64, count in 0usize..10) {
             let noise = Noise::new(seed);
             for tick in [tick, tick % 1000] {
-                let (mut wanted, mut found) = (vec![0.0; count], vec![0.0; count]);
+                let [mut wanted, mut next_wanted, mut found, mut next] = [(); 4].map(|()| vec![0.0; count]);
                 standard_normal(seed, tick, &mut wanted);
-                noise.draw(tick, &mut found);
-                prop_assert_eq!(&wanted, &found);
+                standard_normal(seed, tick.wrapping_add(1), &mut next_wanted);
+                noise.draw(tick, [&mut found, &mut next]);
+                prop_assert_eq!((&wanted, &next_wanted), (&found, &next));
             }
         }
     }
@@ -284,12 +298,15 @@ mod tests {
         let noise = Noise::new(3);
         let (mut layers, mut unusual) = ([false; 256], 0);
         for tick in 0..4000 {
-            let (mut wanted, mut found) = ([0.0; 8], [0.0; 8]);
+            let (mut wanted, mut found, mut next) = ([0.0; 8], [0.0; 8], [0.0; 8]);
             standard_normal(3, tick, &mut wanted);
-            unusual += usize::from(!noise.draw_usual(tick, &mut found));
-            noise.draw(tick, &mut found);
+            let [block, _] = noise.blocks([tick, 0]);
+            unusual += usize::from(!noise.draw_usual(block, &mut found));
+            noise.draw(tick, [&mut found, &mut next]);
             assert_eq!(wanted, found);
-            for bits in noise.block(tick) {
+            standard_normal(3, tick + 1, &mut wanted);
+            assert_eq!(wanted, next);
+            for bits in block {
                 layers[(bits & 0xff) as usize] = true;
             }
         }

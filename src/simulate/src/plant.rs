@@ -21,7 +21,7 @@ use ftc_plant::noise::Noise;
 use ftc_plant::scenario::{FaultEvent, Scenario};
 use ftc_plant::{Deviation, Mode, SwitchedPlant};
 use ftc_record::plain;
-use schedule::{Schedule, Signal};
+use schedule::{Of, Schedule};
 use serde::{Deserialize, Serialize};
 
 /// A plant and its scenario: immutable, shared by any number of [`PlantState`]s.
@@ -131,14 +131,22 @@ pub struct PlantState {
     pub disturbance: Vec<f64>,
     /// Reference `y_ref` (r).
     pub reference: Vec<f64>,
-    /// The scenario's part of the disturbance (s), and the tick for which it and the reference were
-    /// played, if any.
+    /// The scenario's part of the disturbance (s) and of the faults (p), and the tick for which these and the
+    /// reference were played, if any.
     waves: Vec<f64>,
+    scheduled: Vec<f64>,
     played: Option<u64>,
+    /// The ticks, end excluded, over which the scenario gives the same modes, events and constant signals.
+    constant: (u64, u64),
+    /// Whether one of its events strikes in these ticks.
+    struck: bool,
     /// Measurement noise (p).
     pub noise: Vec<f64>,
     /// The tick that the noise was drawn for, if any was.
     drawn: Option<u64>,
+    /// The noise of the next tick (p), if it is this one.
+    next_noise: Vec<f64>,
+    next_drawn: Option<u64>,
     /// Last reading outside any event (p), for sensors that get stuck.
     last: Vec<f64>,
     /// Scratch (n).
@@ -156,13 +164,17 @@ ftc_control::state!(PlantState {
         disturbance,
         reference,
         waves,
+        scheduled,
         noise,
+        next_noise,
         last,
         next,
         departed
     ],
     constants: [],
-    counters: [tick, mode, told, played, drawn]
+    counters: [
+        tick, mode, told, played, constant, struck, drawn, next_drawn
+    ]
 });
 
 impl PlantSimulator {
@@ -186,7 +198,7 @@ impl PlantSimulator {
         Self {
             sampled,
             modes: plant.modes.iter().map(Dynamics::new).collect(),
-            schedule: Schedule::new(&scenario, plant.sample_time),
+            schedule: Schedule::new(&scenario, &deviation, plant.sample_time),
             noise: (scenario.noise.iter().any(|&d| d != 0.0)).then(|| Noise::new(scenario.seed)),
             plant,
             true_plant,
@@ -233,9 +245,14 @@ impl PlantSimulator {
             disturbance: vec![0.0; dims.disturbances],
             reference: vec![0.0; self.scenario.reference.len()],
             waves: vec![0.0; dims.disturbances],
+            scheduled: vec![0.0; dims.outputs],
             played: None,
+            constant: (0, 0),
+            struck: false,
             noise: vec![0.0; dims.outputs],
             drawn: None,
+            next_noise: vec![0.0; dims.outputs],
+            next_drawn: None,
             last: point.y.clone(),
             next: vec![0.0; dims.states],
             departed: Departed::new(point, &self.deviation),
@@ -249,29 +266,18 @@ impl PlantSimulator {
 
     /// Makes every output of the present tick from the present state.
     pub fn observe(&self, state: &mut PlantState, external: &External<'_>) {
-        let te = self.plant.sample_time;
         let tick = state.tick;
-        let schedule = &self.schedule;
-        let built_in = external.mode.is_none();
-        state.mode = self.active_mode(external, tick);
-        state.told = self.told_mode(external, state.mode, tick);
-        state.departed.scenario_enabled = built_in;
+        let (first, end) = state.constant;
+        if !(first <= tick && tick < end) || external.mode.is_some() {
+            self.play_constants(state, external);
+        }
+        // A tick is observed twice: when the one before it ends, and when it begins.
+        if state.played != Some(tick) && external.mode.is_none() {
+            self.play_moving(state);
+        }
         let Some(mode) = self.modes.get(state.mode) else {
             return;
         };
-        let value = |signal: &Signal| {
-            if built_in { signal.at(tick, te) } else { 0.0 }
-        };
-        // A tick is observed twice: when the one before it ends, and when it begins.
-        if state.played != Some(tick) || !built_in {
-            for (out, signal) in state.reference.iter_mut().zip(&schedule.reference) {
-                *out = value(signal);
-            }
-            for (out, signal) in state.waves.iter_mut().zip(&schedule.disturbance) {
-                *out = value(signal);
-            }
-            state.played = built_in.then_some(tick);
-        }
         for ((out, wave), &added) in state
             .disturbance
             .iter_mut()
@@ -281,19 +287,54 @@ impl PlantSimulator {
             *out = kernel::bounded(wave + added);
         }
         self.load_disturbance(state);
-        for ((out, signal), &added) in state
-            .fault
-            .iter_mut()
-            .zip(&schedule.fault)
-            .zip(external.fault)
-        {
-            *out = value(signal) + added;
-        }
         self.draw_noise(state, external.noise);
         let seen = [(&mode.c, &*state.x), (&mode.f, &*state.disturbance)];
         kernel::affine_sum(&mut state.y_true, &mode.output_offset, seen);
         kernel::bound(&mut state.y_true);
-        self.read_sensors(state, built_in);
+        self.read_sensors(state, external.fault);
+    }
+
+    /// What the scenario holds for some ticks: modes, constant signals, whether an event strikes. Nothing of it
+    /// while a mode is given in its place.
+    #[cold]
+    fn play_constants(&self, state: &mut PlantState, external: &External<'_>) {
+        let (tick, te) = (state.tick, self.plant.sample_time);
+        let built_in = external.mode.is_none();
+        state.mode = self.active_mode(external, tick);
+        state.told = self.told_mode(external, state.mode, tick);
+        state.departed.scenario_enabled = built_in;
+        state.played = None;
+        for (values, signals) in [
+            (&mut state.reference, &self.schedule.reference),
+            (&mut state.waves, &self.schedule.disturbance),
+            (&mut state.scheduled, &self.schedule.fault),
+        ] {
+            for (value, signal) in values.iter_mut().zip(signals) {
+                *value = if built_in { signal.at(tick, te) } else { 0.0 };
+            }
+        }
+        let mut events = self.schedule.events.iter();
+        state.struck = built_in && events.any(|(lasts, _)| lasts.contains(&tick));
+        state.constant = match built_in {
+            true => self.schedule.constant_around(tick),
+            false => (0, 0),
+        };
+    }
+
+    /// The scenario's signals that move, at the present tick.
+    fn play_moving(&self, state: &mut PlantState) {
+        let (tick, te) = (state.tick, self.plant.sample_time);
+        for moving in &self.schedule.moving {
+            let values = match moving.of {
+                Of::Reference => &mut state.reference,
+                Of::Fault => &mut state.scheduled,
+                Of::Disturbance => &mut state.waves,
+            };
+            if let Some(value) = values.get_mut(moving.index) {
+                *value = moving.waveform.at(tick, te);
+            }
+        }
+        state.played = Some(tick);
     }
 
     /// The mode (0-based) at `tick`: the scenario's, unless another is given.
@@ -311,23 +352,20 @@ impl PlantSimulator {
     /// became so, and later ticks go on from there.
     pub fn advance(&self, state: &mut PlantState, u: &[f64]) -> Result<(), Stalled> {
         self.actuate(state, u);
-        let applied = core::mem::take(&mut state.departed.applied);
-        let u = applied.as_slice();
         let result = match &self.true_plant {
             TruePlant::Rectifier(rectifier) => rectifier::advance_rectifier(
                 (rectifier, self.sampled.as_ref()),
                 state.mode,
                 &mut state.x,
-                u,
+                &state.departed.applied,
                 &state.disturbance,
                 self.plant.sample_time,
             ),
             TruePlant::AsDesigned | TruePlant::Linear { .. } | TruePlant::Deviating { .. } => {
-                self.advance_linear(state, u);
+                self.advance_linear(state);
                 Ok(())
             }
         };
-        state.departed.applied = applied;
         self.load_state(state);
         state.departed.read(&state.y_true);
         kernel::bound(&mut state.x);
@@ -335,52 +373,64 @@ impl PlantSimulator {
         result
     }
 
-    fn advance_linear(&self, state: &mut PlantState, u: &[f64]) {
+    fn advance_linear(&self, state: &mut PlantState) {
         let Some(mode) = self.modes.get(state.mode) else {
             return;
         };
         let moved = [
             (&mode.a, &*state.x),
-            (&mode.b, u),
+            (&mode.b, &*state.departed.applied),
             (&mode.e, &*state.disturbance),
         ];
         kernel::affine_sum(&mut state.next, &mode.state_offset, moved);
-        kernel::copy(&mut state.x, &state.next);
+        core::mem::swap(&mut state.x, &mut state.next);
     }
 
     fn draw_noise(&self, state: &mut PlantState, on: bool) {
+        let tick = state.tick;
         let Some(noise) = self.noise.as_ref().filter(|_| on) else {
             state.noise.fill(0.0);
-            state.drawn = None;
+            (state.drawn, state.next_drawn) = (None, None);
             return;
         };
-        if state.drawn.replace(state.tick) == Some(state.tick) {
+        if state.drawn.replace(tick) == Some(tick) {
             return;
         }
-        noise.draw(state.tick, &mut state.noise);
-        state
-            .noise
-            .iter_mut()
-            .zip(&self.scenario.noise)
-            .for_each(|(value, d)| *value *= d);
+        if state.next_drawn.take() == Some(tick) {
+            core::mem::swap(&mut state.noise, &mut state.next_noise);
+            return;
+        }
+        noise.draw(tick, [&mut state.noise, &mut state.next_noise]);
+        let two = state.noise.iter_mut().zip(&mut state.next_noise);
+        for ((now, next), d) in two.zip(&self.scenario.noise) {
+            (*now, *next) = (*now * d, *next * d);
+        }
+        state.next_drawn = Some(tick.wrapping_add(1));
     }
 
-    /// `y = y_true + f + noise`, unless an event replaces the reading.
-    fn read_sensors(&self, state: &mut PlantState, events: bool) {
+    /// `y = y_true + f + noise`, unless an event replaces the reading; `f` is the scenario's and what is `added` (p).
+    fn read_sensors(&self, state: &mut PlantState, added: &[f64]) {
         let (tick, te) = (state.tick, self.plant.sample_time);
         let clean = state.departed.seen(&state.y_true).iter().zip(&state.noise);
+        let faults = state.scheduled.iter().zip(added);
         let read = state
             .y
             .iter_mut()
             .zip(&mut state.fault)
             .zip(&mut state.last);
-        for (sensor, (((y, fault), last), (truth, noise))) in read.zip(clean).enumerate() {
+        let sensors = read.zip(clean.zip(faults));
+        for (sensor, (((y, fault), last), ((truth, noise), (scheduled, added)))) in
+            sensors.enumerate()
+        {
             let healthy = truth + noise;
+            *fault = scheduled + added;
             let mut reading = healthy + *fault;
             let mut struck = false;
-            for event in self.acting(sensor, tick, events) {
-                reading = event.reading(reading, *last, tick, te);
-                struck = true;
+            if state.struck {
+                for event in self.acting(sensor, tick, true) {
+                    reading = event.reading(reading, *last, tick, te);
+                    struck = true;
+                }
             }
             if !reading.is_finite() {
                 *fault = 0.0;
@@ -436,12 +486,12 @@ mod tests {
         /// What comes as bytes is compared with the plant's sizes; a tick must not rely on it.
         #[test]
         fn no_step_panics_whatever_the_sizes(
-            sizes in prop::array::uniform9(0usize..4), mode in 0usize..3,
+            sizes in prop::array::uniform11(0usize..4), mode in 0usize..3,
             given in prop::option::of(0usize..3), [m, p, s] in prop::array::uniform3(0usize..4),
         ) {
             let simulator = simulator();
-            let [x, y, y_true, fault, disturbance, reference, noise, last, next] = sizes.map(|size| vec![1.0; size]);
-            let mut state = PlantState { tick: 3, mode, x, y, y_true, fault, waves: disturbance.clone(), disturbance, reference, played: None, noise, last, next, told: mode, drawn: None, departed: Departed::default() };
+            let [x, y, y_true, fault, disturbance, reference, scheduled, noise, next_noise, last, next] = sizes.map(|size| vec![1.0; size]);
+            let mut state = PlantState { tick: 3, mode, x, y, y_true, fault, waves: disturbance.clone(), disturbance, reference, scheduled, played: None, constant: (0, 0), struck: false, noise, next_noise, next_drawn: None, last, next, told: mode, drawn: None, departed: Departed::default() };
             let (u, f, w) = (vec![1.0; m], vec![1.0; p], vec![1.0; s]);
             let external = External::new(&f, &w).in_mode(given);
             simulator.advance(&mut state, &u).unwrap();

@@ -108,7 +108,7 @@ fn count_until(
     clock.set_up(start, stop).unwrap();
     let (mut begun, mut ended) = (0, 0);
     for (from, step) in steps {
-        clock = clock.advanced(from, step).unwrap();
+        clock.advance(from, step).unwrap();
         while let Some(event) = clock.next_event() {
             match event {
                 Event::Begin(k) => {
@@ -415,9 +415,9 @@ fn points_rounded_to_four_digits_never_run_ahead_of_their_inputs() {
     let mut clock = Clock::new(1.0 / 30.0);
     clock.set_up(0.0, None).unwrap();
     for k in 0..100_000 {
-        let before = clock.clone();
+        let before = clock;
         let step = rounded(k + 1) - rounded(k);
-        clock = clock.advanced(rounded(k), step).unwrap();
+        clock.advance(rounded(k), step).unwrap();
         let events: Vec<_> = std::iter::from_fn(|| clock.next_event()).collect();
         assert_eq!(events, [Event::Begin(k), Event::End(k)]);
         assert!(!before.begins_within(k));

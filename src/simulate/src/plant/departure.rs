@@ -25,16 +25,23 @@ impl PlantSimulator {
     }
 
     /// What the actuators make of the command `u` (m).
+    #[inline]
     pub(super) fn actuate(&self, state: &mut PlantState, u: &[f64]) {
-        let (tick, te) = (state.tick, self.plant.sample_time);
         let departed = &mut state.departed;
         kernel::copy(&mut departed.applied, u);
         for (value, gain) in departed.applied.iter_mut().zip(&self.deviation.input_gain) {
             *value *= gain;
         }
-        if !departed.scenario_enabled || !self.moves_inputs() {
-            return;
+        if departed.scenario_enabled && self.moves_inputs() {
+            self.move_inputs(state);
         }
+    }
+
+    /// Faults of actuators and loads on inputs.
+    #[inline(never)]
+    fn move_inputs(&self, state: &mut PlantState) {
+        let (tick, te) = (state.tick, self.plant.sample_time);
+        let departed = &mut state.departed;
         for (input, (value, held)) in departed
             .applied
             .iter_mut()

@@ -81,11 +81,16 @@ impl Injected<'_> {
 
 impl PlantSimulator {
     /// Changes the readings that were just observed.
+    #[inline]
     pub fn inject(&self, state: &mut PlantState, injected: &Injected<'_>) {
         if injected.kind.iter().all(|&kind| kind == 0.0) {
             ftc_control::kernel::copy(&mut state.departed.reading, &state.y);
-            return;
+        } else {
+            self.inject_some(state, injected);
         }
+    }
+
+    fn inject_some(&self, state: &mut PlantState, injected: &Injected<'_>) {
         let te = self.plant.sample_time;
         let departed = &mut state.departed;
         if injected.kind.contains(&f64::from(LAST_INJECTED_KIND)) {
