@@ -2,9 +2,7 @@
 
 use crate::table::{Place, Row, Table, contents};
 use crate::{Error, TimeColumnError, TimeError, quote};
-use jiff::Timestamp;
-use jiff::civil::DateTime;
-use jiff::tz::TimeZone;
+use chrono::{DateTime, FixedOffset, NaiveDate, NaiveDateTime};
 
 /// Names of a time column, in any case and without a unit behind them.
 const NAMES: [&str; 8] = [
@@ -16,6 +14,14 @@ const NAMES: [&str; 8] = [
     "datetime",
     "date time",
     "date/time",
+];
+
+/// How a local time is written.
+const LOCAL: [&str; 4] = [
+    "%Y-%m-%dT%H:%M:%S%.f",
+    "%Y-%m-%d %H:%M:%S%.f",
+    "%Y-%m-%dT%H:%M",
+    "%Y-%m-%d %H:%M",
 ];
 
 /// Units behind the name, in seconds.
@@ -296,12 +302,52 @@ fn printed_step(text: &str) -> f64 {
     10f64.powi(exponent.saturating_sub(digits as i32).clamp(-300, 300))
 }
 
-/// An ISO time stamp in nanoseconds: an instant, or a local time without a zone.
+/// An ISO time stamp in nanoseconds: an instant, or a local time without a zone, or a day.
 fn stamp(text: &str) -> Option<i128> {
-    let instant = text.parse::<Timestamp>().ok();
-    let local = || {
-        let time: DateTime = text.parse().ok()?;
-        TimeZone::UTC.to_timestamp(time).ok()
-    };
-    instant.or_else(local).map(Timestamp::as_nanosecond)
+    let text = &text.trim().replace(',', ".");
+    let instant = || text.parse::<DateTime<FixedOffset>>().ok();
+    let local = |format| NaiveDateTime::parse_from_str(text, format).ok();
+    let day = || text.parse::<NaiveDate>().ok()?.and_hms_opt(0, 0, 0);
+    let time = LOCAL.iter().find_map(|format| local(format)).or_else(day);
+    let time = time
+        .map(|time| time.and_utc().fixed_offset())
+        .or_else(instant)?;
+    let nanoseconds = i128::from(time.timestamp_subsec_nanos());
+    Some(i128::from(time.timestamp()) * 1_000_000_000 + nanoseconds)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_time_stamp_counts_the_same_however_it_is_written() {
+        let noon = stamp("2026-03-01T12:00:00").unwrap();
+        for text in [
+            "2026-03-01 12:00:00",
+            "2026-03-01 12:00",
+            "2026-03-01T12:00",
+            "2026-03-01T12:00:00Z",
+            "2026-03-01T13:00:00+01:00",
+            "2026-03-01T13:00:00.000+01:00",
+            "2026-03-01 06:30:00-05:30",
+        ] {
+            assert_eq!(stamp(text), Some(noon), "{text}");
+        }
+        for text in ["2026-03-01T12:00:00.5", "2026-03-01 12:00:00,5"] {
+            assert_eq!(stamp(text), Some(noon + 500_000_000), "{text}");
+        }
+        assert_eq!(stamp("2026-03-02").unwrap() - noon, 43_200_000_000_000);
+        assert_eq!(stamp("1969-12-31T23:59:59.75"), Some(-250_000_000));
+        for text in [
+            "",
+            "12",
+            "12.5",
+            "noon",
+            "2026-13-01T12:00:00",
+            "2026-03-01T25:00:00",
+        ] {
+            assert_eq!(stamp(text), None, "{text}");
+        }
+    }
 }
