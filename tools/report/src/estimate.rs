@@ -20,7 +20,7 @@ pub fn design(request: &Request, threads: usize) -> Option<String> {
     let work = Work::new(size, modes, &request.control);
     work.check(&request.control).ok()?;
     let memory = work.bytes * threads.min(modes) as f64;
-    let memory = match memory > LARGE {
+    let memory = match memory > LARGE && !work.by_riccati {
         true => format!(" and {} of memory", bytes(memory)),
         false => String::new(),
     };

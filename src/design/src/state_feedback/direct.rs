@@ -5,13 +5,7 @@ use super::synthesis::{AGREEMENT, Levels, Optimum, Problem, RELAXATIONS, TRANSFO
 use super::transformation::{Part, Transformation};
 use super::{REJECTION, StateFeedback, riccati, structured};
 use crate::verdict::{DesignError, Uncertified};
-use crate::{CertificateError, Lyapunov, parallel};
-
-/// Floating-point operations beyond which a `dwell` design is left to Riccati equations.
-const LARGEST_WORK: f64 = 6e11;
-
-/// Iterations of all solutions of one problem.
-const ITERATIONS: f64 = 45.0;
+use crate::{CertificateError, Lyapunov, parallel, work};
 
 /// Augmented states of one mode, and of all together, up to which the general solver is asked where this
 /// one leaves doubt: its work grows with the sixth power of the first.
@@ -77,7 +71,7 @@ impl Problem<'_> {
     pub(super) fn direct(&self) -> Option<StateFeedback> {
         let groups = self.groups();
         if self.spec.lyapunov == Lyapunov::Dwell
-            && self.work() > LARGEST_WORK
+            && self.is_left_to_riccati()
             && let Some(design) = self.by_riccati()
         {
             return Some(design);
@@ -285,12 +279,8 @@ impl Problem<'_> {
         size <= one && size * self.models.len() <= all
     }
 
-    /// Floating-point operations of a `dwell` design by the interior-point method.
-    fn work(&self) -> f64 {
+    fn is_left_to_riccati(&self) -> bool {
         let (size, inputs) = self.models[0].b.shape();
-        let (symmetric, full) = ((size * (size + 1) / 2) as f64, (size * inputs) as f64);
-        let factors = (symmetric.powi(3) + full.powi(3)) / 3.0;
-        let coupling = full * symmetric * (full + symmetric);
-        ITERATIONS * self.models.len() as f64 * (factors + coupling)
+        work::is_left_to_riccati(size, inputs, self.models.len())
     }
 }
