@@ -115,13 +115,29 @@ impl Bank {
         reading: Reading<'_>,
         (action, log_rate, convinced): (Action, f64, bool),
     ) {
-        let score =
-            parent.score + log_rate + self.trial(state, parent.slot, model, reading, action);
+        let value = self.trial(state, parent.slot, model, reading, action);
+        let score = parent.score + log_rate + value;
         let by_residual = matches!(action, Action::Bias(_) | Action::Scale(_));
         let at_once = !by_residual || self.settings.trusts_model() || score > parent.stay;
+        // A bias that comes back is likelier than a new one, and must be as abrupt.
+        let log_rate = log_rate.max(self.comes_back(state, action));
+        let score = parent.score + log_rate + value;
         state
             .candidates
             .add(parent.then(action, score, convinced && at_once));
+    }
+
+    /// Log probability that what `action` begins are biases that only paused: each of them comes back as often as a
+    /// present one changes its size.
+    fn comes_back(&self, state: &BankState, action: Action) -> f64 {
+        let Action::Bias(set) = action else {
+            return f64::NEG_INFINITY;
+        };
+        let paused = state.paused.iter().enumerate();
+        let of_set = paused.filter(|&(q, _)| has(set, q));
+        of_set
+            .map(|(_, paused)| libm::log(*paused) + self.log_rates.change)
+            .sum()
     }
 
     /// The plant: its loads, its matrices, where it started.
