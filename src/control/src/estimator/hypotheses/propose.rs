@@ -128,7 +128,7 @@ impl Bank {
     }
 
     /// Log probability that what `action` begins are biases that only paused: each of them comes back as often as a
-    /// present one changes its size.
+    /// present one changes its size. Of a sensor that had none it is finite, as no trap may be raised.
     fn comes_back(&self, state: &BankState, action: Action) -> f64 {
         let Action::Bias(set) = action else {
             return f64::NEG_INFINITY;
@@ -136,7 +136,7 @@ impl Bank {
         let paused = state.paused.iter().enumerate();
         let of_set = paused.filter(|&(q, _)| has(set, q));
         of_set
-            .map(|(_, paused)| libm::log(*paused) + self.log_rates.change)
+            .map(|(_, paused)| libm::log(paused.max(f64::MIN_POSITIVE)) + self.log_rates.change)
             .sum()
     }
 
