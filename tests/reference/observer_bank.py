@@ -186,8 +186,6 @@ class Bank:
         self.aside: tuple[Hypothesis, Seen] | None = None
         self.unloaded, self.usual = (ModelRun(self.plants[mode], self.settings, self.tuning) for _ in range(2))
         self.apart = self.suspect = self.flagged = NOBODY
-        # Probability that a bias which has ended only pauses.
-        self.paused = np.zeros(p)
         self.misfit, self.model_valid = float(p), True
         self.expected, self.residual, self.load = np.zeros(p), np.zeros(p), np.zeros(self.at.m)
         self.actuator_fault = np.zeros(self.at.m, dtype=bool)
@@ -425,8 +423,6 @@ class Bank:
         plant = self.plants[self.mode]
         self.expected = plant.output(best.z[at.x], best.z[at.wave])
         self.flagged = best.flagged | frozenset(np.flatnonzero(~reading.valid).tolist())
-        lasts = np.isin(np.arange(at.p), list(best.additive))
-        self.paused = np.where(lasts, 1.0, self.paused * (1.0 - self.settings["release_rate"]))
         corrected = np.isin(np.arange(at.p), list(best.flagged))
         self.residual = np.where(corrected, reading.y - self.expected, seen.r)
         self.misfit += self.tuning["misfit_share"] * (min(seen.square, 1e3) - self.misfit)
@@ -548,15 +544,8 @@ class Proposals:
         by_residual = name in ("bias", "scale") and not self.bank.trusts_model
         convinced = convinced and (not by_residual or score > self.stay)
         child = trial.child
-        if name == "bias":
-            score += max(self._comes_back(child.additive - self.h.additive) - log_rate, 0.0)
         candidate = Candidate(name, score, self.index, convinced, child.kinds, child.loose, misfit, lambda: child)
         self.list.append(candidate)
-
-    def _comes_back(self, sensors: frozenset[int]) -> float:
-        """Log probability that biases of all these only paused: each returns as often as one changes its size."""
-        paused = self.bank.paused[list(sensors)]
-        return float(np.sum(np.log(paused) + self.log_rate["change"])) if np.all(paused > 0.0) else -math.inf
 
     # The plant.
 

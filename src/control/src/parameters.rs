@@ -400,9 +400,9 @@ pub struct Hypotheses {
     pub fault_rate: f64,
     /// Freezes per sample and sensor.
     pub stuck_rate: f64,
-    /// Ends of a fault per sample, also of one that pauses: one over its mean length.
+    /// Ends of a fault per sample: one over its mean length.
     pub release_rate: f64,
-    /// Jumps of a present fault per sample, and returns of a bias that only pauses.
+    /// Jumps of a present fault per sample.
     pub change_rate: f64,
     /// Jumps of loads or of input gains per sample.
     pub load_rate: f64,

@@ -6,10 +6,6 @@
 //! bias, a wrong gain, a frozen value), changed their fault, or recovered. Each of these has a
 //! probability per sample, and the likelihood of the readings decides between what they leave.
 //!
-//! A bias that has ended may only pause, as an intermittent one does. While it does, its return is as probable as
-//! a change of its size (`change_rate`), not as a new fault; that it does grows less probable by the share of
-//! faults that end in a sample (`release_rate`).
-//!
 //! A sensor fault counts where the sensor's reading left what is expected of it within one sample, or
 //! repeats one value while the model moves, and where it beats the best explanation without one by
 //! given odds. What grows slowly can be a load or a sensor's drift: `suspect` names the sensors, and
@@ -36,7 +32,6 @@ pub use model::Layout;
 
 use super::super::parameters::Hypotheses;
 use crate::compensation::is_measurement;
-use crate::kernel::bounded;
 use candidates::Candidates;
 use expectation::Expectation;
 use hypothesis::{Innovation, Step};
@@ -166,8 +161,6 @@ pub struct BankState {
     repeating: Sensors,
     /// Sensors that did so a sample ago and do not now.
     resumed: Sensors,
-    /// Probability that a bias which has ended only pauses; one while it lasts (p).
-    paused: Vec<f64>,
     best: usize,
     /// Sensors that loads have moved away from the model in open loop.
     apart: Sensors,
@@ -213,7 +206,6 @@ crate::state!(BankState {
         moved_from,
         mean,
         count,
-        paused,
         unloaded,
         usual,
         expected,
@@ -426,15 +418,6 @@ impl Bank {
         }
         let all = if p >= 64 { u64::MAX } else { (1 << p) - 1 };
         state.flagged = h.flagged() | (all & !reading.valid);
-        let ends = self.settings.release_rate;
-        for (q, paused) in state.paused.iter_mut().enumerate() {
-            // A fault that pauses ends for good as often as one that lasts.
-            *paused = if has(h.additive, q) {
-                1.0
-            } else {
-                bounded(*paused * (1.0 - ends))
-            };
-        }
         for q in 0..p {
             state.residual[q] = if has(h.flagged(), q) {
                 reading.y[q] - state.expected[q]

@@ -115,29 +115,13 @@ impl Bank {
         reading: Reading<'_>,
         (action, log_rate, convinced): (Action, f64, bool),
     ) {
-        let value = self.trial(state, parent.slot, model, reading, action);
-        let score = parent.score + log_rate + value;
+        let score =
+            parent.score + log_rate + self.trial(state, parent.slot, model, reading, action);
         let by_residual = matches!(action, Action::Bias(_) | Action::Scale(_));
         let at_once = !by_residual || self.settings.trusts_model() || score > parent.stay;
-        // A bias that comes back is likelier than a new one, and must be as abrupt.
-        let log_rate = log_rate.max(self.comes_back(state, action));
-        let score = parent.score + log_rate + value;
         state
             .candidates
             .add(parent.then(action, score, convinced && at_once));
-    }
-
-    /// Log probability that what `action` begins are biases that only paused: each of them comes back as often as a
-    /// present one changes its size. Of a sensor that had none it is finite, as no trap may be raised.
-    fn comes_back(&self, state: &BankState, action: Action) -> f64 {
-        let Action::Bias(set) = action else {
-            return f64::NEG_INFINITY;
-        };
-        let paused = state.paused.iter().enumerate();
-        let of_set = paused.filter(|&(q, _)| has(set, q));
-        of_set
-            .map(|(_, paused)| libm::log(paused.max(f64::MIN_POSITIVE)) + self.log_rates.change)
-            .sum()
     }
 
     /// The plant: its loads, its matrices, where it started.

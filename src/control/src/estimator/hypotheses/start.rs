@@ -289,7 +289,6 @@ impl Bank {
             moved_from: vec![0.0; p],
             mean: vec![0.0; p],
             count: vec![0.0; p],
-            paused: vec![0.0; p],
             repeating: 0,
             resumed: 0,
             best: 0,
