@@ -3,6 +3,7 @@
 use crate::running_loop;
 use crate::text::{count, number, with_units};
 use crate::warnings;
+use design_file::wording;
 use ftc_control::parameters::{Compensation, EstimatorMethod, Hypotheses, ObserverKind};
 use ftc_design::apart;
 use ftc_design::augmented::assumes_input_disturbance;
@@ -429,7 +430,7 @@ pub fn json_of_failure(asked: &ControlSpec, failure: &Failure) -> String {
         }
         _ => (Value::Null, Vec::new(), [].as_slice()),
     };
-    let advice: Vec<String> = advice.iter().map(ToString::to_string).collect();
+    let advice: Vec<String> = advice.iter().map(wording::of_advice).collect();
     pretty(&json!({
         "feasible": feasible,
         "certified": false,
@@ -446,7 +447,7 @@ pub fn json_of_failure(asked: &ControlSpec, failure: &Failure) -> String {
         "latency": asked.latency,
         "blocks": blocks,
         "advice": advice,
-        "reason": failure.to_string(),
+        "reason": wording::of_error(&failure.error),
     }))
 }
 
