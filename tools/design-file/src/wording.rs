@@ -392,3 +392,152 @@ fn complex(value: Complex<f64>) -> String {
         false => format!("{:.4}{:+.4}i", value.re, value.im),
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn keys(said: &str, keys: &[&str]) {
+        for key in keys {
+            assert!(said.contains(key), "no {key} in: {said}");
+        }
+    }
+
+    #[test]
+    fn every_advice_is_a_key_with_its_value() {
+        for (advice, key) in [
+            (Advice::Decay(0.98), "controller.decay = 0.98"),
+            (
+                Advice::Lyapunov(Lyapunov::Dwell),
+                "controller.lyapunov = \"dwell\"",
+            ),
+            (Advice::Tracked(vec![0, 2]), "controller.tracked = [1, 3]"),
+            (Advice::ObserverDecay(0.9), "observer.decay = 0.9"),
+            (
+                Advice::ObserverLyapunov(Lyapunov::Switched),
+                "controller.lyapunov = \"switched\"",
+            ),
+            (Advice::Harmonics(0), "controller.internal_model = false"),
+            (Advice::Harmonics(2), "disturbance.harmonics = 2"),
+        ] {
+            keys(&of_advice(&advice), &[key]);
+        }
+    }
+
+    #[test]
+    fn what_is_wrong_with_a_request_names_the_keys_to_change() {
+        let eigenvalue = Complex::new(0.97, 0.0);
+        let errors: [(RequestError, &[&str]); 15] = [
+            (RequestError::Bumpless, &["controller.bumpless = true"]),
+            (RequestError::NoDisturbance, &["observer.kind = \"uio\""]),
+            (
+                RequestError::HiddenDisturbance {
+                    mode: 1,
+                    successor: 2,
+                    seen: 0,
+                    wanted: 1,
+                },
+                &["when mode 2 follows", "observer.kind = \"luenberger\""],
+            ),
+            (
+                RequestError::ResponseLength {
+                    length: 1500,
+                    inputs: 2,
+                    most: 1000,
+                },
+                &["estimator.response_length", "sample_time"],
+            ),
+            (
+                RequestError::Undetectable {
+                    mode: 1,
+                    decay: 0.8,
+                    magnitude: 0.95,
+                    decoupled: false,
+                },
+                &["observer.decay = 0.8", "set observer.decay above 0.95"],
+            ),
+            (
+                RequestError::Undetectable {
+                    mode: 1,
+                    decay: 0.8,
+                    magnitude: 1.5,
+                    decoupled: true,
+                },
+                &["set observer.kind = \"auto\""],
+            ),
+            (
+                Uncontrollable::Eigenvalue {
+                    mode: 1,
+                    eigenvalue,
+                    decay: 0.9,
+                }
+                .into(),
+                &[
+                    "eigenvalue 0.9700 of",
+                    "controller.decay = 0.9:",
+                    "set controller.decay above 0.97",
+                ],
+            ),
+            (
+                Uncontrollable::Tracked { mode: 2 }.into(),
+                &["controller.tracked"],
+            ),
+            (
+                Uncontrollable::Harmonic {
+                    mode: 2,
+                    harmonic: 1,
+                }
+                .into(),
+                &["disturbance.harmonics", "controller.internal_model = false"],
+            ),
+            (
+                CommissioningError::Unstable {
+                    mode: 1,
+                    radius: 1.1,
+                }
+                .into(),
+                &["estimator.method = \"observer\""],
+            ),
+            (
+                RequestError::Database {
+                    mode: 1,
+                    error: CommissioningError::NoExcitation,
+                },
+                &["mode 1: the database excites nothing"],
+            ),
+            (
+                SpecError::Decay {
+                    of: DecayRate::Observer,
+                    decay: 2.0,
+                }
+                .into(),
+                &["observer.decay is 2"],
+            ),
+            (
+                SpecError::NoDwellTime(DecayRate::Feedback).into(),
+                &["controller.decay = 1"],
+            ),
+            (
+                SpecError::Weight(Weight::Integral).into(),
+                &["controller.integral_weight"],
+            ),
+            (
+                SpecError::Harmonic {
+                    harmonic: 3,
+                    samples: 1.5,
+                    shortest: 2.0,
+                    longest: 6283.0,
+                }
+                .into(),
+                &[
+                    "sample_time",
+                    "disturbance.harmonics = 2",
+                    "controller.internal_model = false",
+                ],
+            ),
+        ];
+        for (error, named) in errors {
+            keys(&of_error(&error.into()), named);
+        }
+    }
+}
