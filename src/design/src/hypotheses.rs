@@ -1,9 +1,12 @@
 //! Sizes and rates for the state-based estimator, from the plant and its signals.
 
 use crate::harmonics::KnownDisturbance;
+use crate::steady_state::steady_state;
 use crate::{Signal, Signals};
 use ftc_control::parameters::{Ambiguous, Hypotheses};
+use ftc_plant::scenario::Waveform;
 use ftc_plant::{Mode, Scenario, SwitchedPlant};
+use nalgebra::DVector;
 
 /// What may be asked of the state-based estimator; the rest follows from the design.
 #[derive(Clone, Debug, PartialEq)]
@@ -61,8 +64,9 @@ const DRIFT_WALK: f64 = 0.5;
 const FAULT_SIZE: [f64; 2] = [0.6, 0.5];
 /// Size of a fault relative to a known range.
 const FAULT_OF_RANGE: f64 = 0.5;
-/// Authority without a known range, relative to the nominal value and to the operating point.
-const AUTHORITY: [f64; 2] = [2.5, 2.0];
+/// Authority without a known range, relative to the nominal value and to the operating point: a limit for what no
+/// sensor shows, since a reading corrected by less than its fault may leave the loop unstable.
+const AUTHORITY: [f64; 2] = [10.0, 8.0];
 /// Size of a load on an input relative to its nominal value.
 const INPUT_LOAD: f64 = 0.2;
 /// Displacement at rest by a load on a state, relative to the state's nominal value.
@@ -149,17 +153,31 @@ impl HypothesesSpec {
     }
 }
 
-/// How far the scenario's references take each output (p) from its operating points; 0 for the others.
+/// How far the scenario's references take each output (p) from its operating points, at rest in any mode and
+/// with each reference at its furthest; 0 where none moves it.
 pub(crate) fn reach(plant: &SwitchedPlant, tracked: &[usize], scenario: &Scenario) -> Vec<f64> {
-    let mut reach = vec![0.0; plant.dimensions().outputs];
-    for (&output, signal) in tracked.iter().zip(&scenario.reference) {
-        let [low, high] = signal.range(scenario.steps, plant.sample_time);
-        for mode in &plant.modes {
+    let mut reach = vec![0.0f64; plant.dimensions().outputs];
+    for mode in &plant.modes {
+        let furthest = |(&output, signal): (&usize, &Waveform)| {
+            let [low, high] = signal.range(scenario.steps, plant.sample_time);
             let point = mode.operating_point.y[output];
             let far = (high - point).max(point - low);
-            if far.is_finite() {
-                reach[output] = far.max(reach[output]);
-            }
+            if far.is_finite() { far } else { 0.0 }
+        };
+        let far: Vec<f64> = tracked
+            .iter()
+            .zip(&scenario.reference)
+            .map(furthest)
+            .collect();
+        let rests = steady_state(mode, tracked);
+        let moved = &mode.c * rests.rows(0, mode.c.ncols());
+        let at_rest = moved.abs() * DVector::from_column_slice(&far);
+        for (reach, &at_rest) in reach.iter_mut().zip(&at_rest) {
+            *reach = reach.max(if at_rest.is_finite() { at_rest } else { 0.0 });
+        }
+        // A mode that cannot rest there is asked for it all the same.
+        for (&output, &far) in tracked.iter().zip(&far) {
+            reach[output] = reach[output].max(far);
         }
     }
     reach
