@@ -484,10 +484,12 @@ class Bank:
         """A mode begins: what the model misses there, and what a load does, may differ."""
         plant, at = self.plants[mode], self.at
         error = self.settings["model_error"] ** 2
+        shows_at_once = self.plants[h.mode].shows_unlike(plant)
         h.mode = mode
         on_states = at.load[at.m + at.s :]
         loads, off = h.z[on_states] ** 2, h.z[at.x] - plant.x0
-        h.P[at.x, at.x] += error * off**2
+        if shows_at_once:
+            h.P[at.x, at.x] += error * off**2
         missed = plant.A**2 @ off**2 + plant.B**2 @ (self.u - plant.u0) ** 2
         h.P[on_states, on_states] += error * missed + 2.0 * np.maximum(loads, loads.mean())
 
@@ -712,6 +714,10 @@ class Proposals:
 
         return change
 
+    def _together(self, sensors: int) -> float:
+        """Log probability that so many sensors fail, or recover, at once over that of one."""
+        return 1.0 + (self.tuning["several"] - 1.0) * (sensors - 1)
+
     def _faults_begin(self) -> None:
         """Of one sensor, of two where there are few, of all."""
         if not self.unlikely:
@@ -719,15 +725,15 @@ class Proposals:
         free = sorted(self.valid - self.h.flagged)
         log_rate = self.tuning["start_fault"] if self.bank.first else self.log_rate["fault"]
         kept = {"convinced": self.h.convinced, "misfit": -2.0 * self.log_rate["fault"]}
-        several = self.tuning["several"] * log_rate
+        pair = self._together(2) * log_rate
         for q in free:
             self._add("bias", log_rate, self._biased(frozenset({q})), **kept)
             self._add("scale", log_rate, self._rescaled(q), **kept)
             if 2 < self.at.p <= 4:
                 for other in (other for other in free if other < q):
-                    self._add("bias", several, self._biased(frozenset({q, other})), **kept)
+                    self._add("bias", pair, self._biased(frozenset({q, other})), **kept)
         if len(free) > 1:
-            self._add("bias", several, self._biased(frozenset(free)), **kept)
+            self._add("bias", self._together(len(free)) * log_rate, self._biased(frozenset(free)), **kept)
 
     def _faults_change_or_end(self) -> None:
         h, bank = self.h, self.bank
@@ -747,7 +753,7 @@ class Proposals:
             log_rate = 0.0 if q in self.resumed else self.log_rate["release"]
             self._release(frozenset({q}), log_rate, convinced=h.convinced or len(h.flagged) == 1)
         if len(known) > 1:
-            self._release(h.flagged, self.tuning["several"] * self.log_rate["release"], convinced=True)
+            self._release(h.flagged, self._together(len(known)) * self.log_rate["release"], convinced=True)
 
     def _release(self, sensors: frozenset[int], log_rate: float, *, convinced: bool) -> None:
         """The recovery of these sensors, unless what it leaves is there already."""

@@ -49,11 +49,14 @@ impl Bank {
         let load = self.layout.load() + self.layout.state_load();
         let model = &self.modes[mode];
         let error = self.settings.model_error * self.settings.model_error;
+        let at_once = self.at_once[h.mode as usize * self.modes.len() + mode];
         h.mode = mode as u32;
         let mean = dot(&h.z[load..load + n], &h.z[load..load + n]) / n.max(1) as f64;
         for i in 0..n {
-            let off = h.z[i] - model.x0[i];
-            h.cov[i * stride + i] += error * off * off;
+            if at_once {
+                let off = h.z[i] - model.x0[i];
+                h.cov[i * stride + i] += error * off * off;
+            }
             let mut sum = 0.0;
             for j in 0..n {
                 let v = model.a[i * n + j] * (h.z[j] - model.x0[j]);
