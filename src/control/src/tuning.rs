@@ -92,8 +92,8 @@ tuning! {
         drift_lead: 1.0, [0.0, 1e12];
         /// Largest number of sensors (1) of which any two may fail at once; of more, one or all.
         pairs_up_to: 4.0, [0.0, 64.0];
-        /// Log probability of several sensors failing at once over that of one, and of loads on all states over that of one
-        /// load (1): less than for independent ones, which would be two.
+        /// Log probability of two sensors failing at once over that of one, and of loads on all states over that of one
+        /// load (1): less than for independent ones, which would be two. Each further sensor adds as much as the second.
         several: 1.5, [0.0, 1e12];
         /// The same of all loads and gains at once, and of a plant that is no longer the model (1).
         everything: 2.0, [0.0, 1e12];
@@ -227,6 +227,12 @@ impl BankTuning {
     /// [`quiet_per_output`](Self::quiet_per_output) and beside, for `outputs` sensors.
     pub(crate) fn quiet(&self, outputs: usize) -> f64 {
         self.quiet_beside + self.quiet_per_output * outputs as f64
+    }
+
+    /// Log probability that so many sensors fail, or recover, at once over that of one: [`several`](Self::several)
+    /// for two.
+    pub(crate) fn together(&self, sensors: u32) -> f64 {
+        1.0 + (self.several - 1.0) * (f64::from(sensors) - 1.0)
     }
 
     /// The same of [`unlikely_per_output`](Self::unlikely_per_output), at most `quiet_beside`.

@@ -247,7 +247,8 @@ impl Bank {
             }
         }
         if free.count_ones() > 1 {
-            consider(Action::Bias(free), self.tuning.several * log_rate);
+            let together = self.tuning.together(free.count_ones());
+            consider(Action::Bias(free), together * log_rate);
         }
     }
 
@@ -294,7 +295,7 @@ impl Bank {
         if known.count_ones() > 1 {
             let all = (
                 parent.flagged,
-                self.tuning.several * log_rates.release,
+                self.tuning.together(known.count_ones()) * log_rates.release,
                 true,
             );
             self.propose_release(state, parent, model, reading, all);
