@@ -101,7 +101,7 @@ fn hardly_ever_worse_than_no_fault_tolerance() {
 fn a_frozen_sensor_hardly_costs() {
     let error = Options::default().model_error;
     for example in ["paper.toml", "paper_latency.toml", "tank.toml"] {
-        let runs = tried(example, error, 300);
+        let runs = tried(example, error, 1200);
         let frozen = runs.iter().filter(|run| run.freezes);
         let mut ratios: Vec<f64> = frozen.map(|run| run.over_told).collect();
         ratios.sort_by(f64::total_cmp);
