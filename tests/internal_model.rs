@@ -167,7 +167,7 @@ fn harmonics_too_near_the_integrator_or_each_other_are_refused_with_limits_that_
     let pi = core::f64::consts::PI;
     for angle in [0.0, 1e-5, pi - 1e-5, pi, 4.0, -0.02, f64::NAN] {
         let error = verdict(&with(vec![angle])).unwrap_err().to_string();
-        assert!(error.contains("sample_time"), "{angle}: {error}");
+        assert!(error.contains("sample time"), "{angle}: {error}");
     }
     let twice = verdict(&with(vec![0.02, 0.02])).unwrap_err().to_string();
     assert!(twice.contains("name each frequency once"), "{twice}");

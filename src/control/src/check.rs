@@ -348,6 +348,19 @@ fn hypotheses(settings: &Hypotheses, sizes: Sizes) -> Checked {
             .all(|value| (0.0..=LARGEST_SIZE).contains(value));
         range(sensible, field, "must hold numbers from 0 to 1e50")?;
     }
+    fitted_modes(settings, sizes)?;
+    range(
+        settings.mode_rate.is_none() || sizes.modes <= MOST_MODES,
+        "estimator.hypotheses.mode_rate",
+        "finds the mode of at most 9 modes",
+    )?;
+    rates_and_shares(settings)
+}
+
+/// Matrices fitted to a log, of every mode or of none.
+fn fitted_modes(settings: &Hypotheses, sizes: Sizes) -> Checked {
+    let (n, m, p) = (sizes.states, sizes.inputs, sizes.outputs);
+    let s = sizes.disturbances;
     if !settings.fitted.is_empty() {
         length(
             "estimator.hypotheses.fitted",
@@ -363,11 +376,10 @@ fn hypotheses(settings: &Hypotheses, sizes: Sizes) -> Checked {
         shape(field("e"), &fitted.e, (n, s))?;
         shape(field("f"), &fitted.f, (p, s))?;
     }
-    range(
-        settings.mode_rate.is_none() || sizes.modes <= MOST_MODES,
-        "estimator.hypotheses.mode_rate",
-        "finds the mode of at most 9 modes",
-    )?;
+    Ok(())
+}
+
+fn rates_and_shares(settings: &Hypotheses) -> Checked {
     let rates = [
         settings.mode_rate.unwrap_or(settings.load_rate),
         settings.fault_rate,

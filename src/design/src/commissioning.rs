@@ -64,7 +64,7 @@ pub enum CommissioningError {
     /// A mode is unstable.
     #[error(
         "mode {mode}: A has spectral radius {radius:.4}, but the estimator needs a stable mode (below 1): \
-         set estimator.method = \"observer\""
+         choose the state-based method"
     )]
     Unstable {
         /// The mode, from 1.
@@ -75,7 +75,7 @@ pub enum CommissioningError {
     /// A mode's response lasts longer than [`LONGEST_RESPONSE`].
     #[error(
         "mode {mode}: the response is still felt after {LONGEST_RESPONSE} samples (spectral radius {radius:.6}): \
-         set estimator.method = \"observer\", or choose a longer sample_time for this loop"
+         choose the state-based method, or a longer sample time for this loop"
     )]
     SlowResponse {
         /// The mode, from 1.

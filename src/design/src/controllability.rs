@@ -17,7 +17,7 @@ pub enum Uncontrollable {
     /// An eigenvalue of a mode that decays more slowly than asked.
     #[error(
         "mode {mode}: (A, B) is uncontrollable: no input moves its eigenvalue {} of magnitude {:.4}, \
-         which decays more slowly than controller.decay = {decay}: add an input or ask for a slower decay",
+         which decays more slowly than the {decay} asked for: add an input or ask for a slower decay",
         shown(*eigenvalue), eigenvalue.norm()
     )]
     Eigenvalue {
@@ -40,7 +40,7 @@ pub enum Uncontrollable {
     /// The tracked outputs at a harmonic of the disturbance.
     #[error(
         "mode {mode}: the inputs cannot move the tracked outputs at harmonic {harmonic} of the disturbance, so no internal \
-         model can reject it: use fewer harmonics, track fewer outputs, or set internal_model = false"
+         model can reject it: use fewer harmonics, track fewer outputs, or leave the internal model out"
     )]
     Harmonic {
         /// The mode.

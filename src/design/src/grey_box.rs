@@ -4,7 +4,7 @@
 //! level of each of its channels are whatever explains the readings best; the matrices, which all windows share,
 //! make the readings of the windows least wrong together (output error), with a penalty on how far they differ from the
 //! design model, entry by entry, relative to the error that the model may have. Gauss-Newton with the windows'
-//! own unknowns projected out.
+//! nuisance parameters (state, waves, level) projected out.
 //!
 //! All modes are fitted together: a window may contain switches, across which the state carries on, and a row of `C`
 //! that is the same in several modes stays the same. This is what keeps the modes' states in common coordinates.
@@ -26,11 +26,11 @@ use ftc_record::plain;
 use model::GreyBox;
 use nalgebra::DVector;
 use parameters::parameters;
-use windows::{HELD_BACK, Record, Window, a_sample_later, cut, records, samples_of, split, usual};
+use windows::{HELD_BACK, Segment, a_sample_later, cut, samples_of, segments, split, usual};
 
 pub(crate) use windows::least_samples;
 
-/// The model error that is left, at least: what no log shows, such as a plant that ages.
+/// The model error that remains, at least: what no log shows, such as a plant that ages.
 const LEAST_ERROR: f64 = 0.01;
 
 /// What a log says of a mode.
@@ -42,7 +42,7 @@ pub(crate) struct Fit {
     pub(crate) deviation: Vec<f64>,
     /// The part of it that is white: the sensors' noise (p), output units.
     pub(crate) noise: Vec<f64>,
-    /// Relative error of the matrices that is left.
+    /// Relative error of the matrices that remains.
     pub(crate) model_error: f64,
 }
 
@@ -68,10 +68,10 @@ pub(crate) fn fit(
     scaling: &Scaling,
 ) -> Result<Vec<Fit>, (usize, Unusable)> {
     let length = least_samples(&modes[0], disturbance);
-    let records = records(stretches, disturbance);
-    let windows: Vec<Window> = records
+    let segments = segments(stretches, disturbance);
+    let windows: Vec<Segment> = segments
         .iter()
-        .flat_map(|record| cut(record, length))
+        .flat_map(|segment| cut(segment, length))
         .collect();
     let short = |mode: &usize| samples_of(&windows, *mode) < HELD_BACK * length;
     if let Some(mode) = (0..modes.len()).find(short) {
@@ -88,36 +88,39 @@ pub(crate) fn fit(
         usual: usual(modes, length, disturbance, scaling),
     };
     let model = grey.design.clone();
-    let (theta, left) = grey.choose(&learn, model_error);
-    let late: Vec<Record> = records.iter().map(a_sample_later).collect();
-    let late: Vec<Window> = late.iter().flat_map(|record| cut(record, length)).collect();
+    let (theta, remaining) = grey.choose(&learn, model_error);
+    let late: Vec<Segment> = segments.iter().map(a_sample_later).collect();
+    let late: Vec<Segment> = late
+        .iter()
+        .flat_map(|segment| cut(segment, length))
+        .collect();
     if let Some(mode) = grey.late(&learn, &late, &theta, model_error) {
         return Err((mode, Unusable::Late));
     }
     // What was held back decides: a log that the model explains better is not used.
-    grey.deviation = grey.unexplained(&held_back, &model);
-    let [of_fit, of_model] = [&theta, &model].map(|theta| grey.rests(&held_back, theta));
-    let (theta, left) = match of_fit < of_model {
-        true => (theta, left),
+    grey.deviation = grey.residual_deviation(&held_back, &model);
+    let [of_fit, of_model] = [&theta, &model].map(|theta| grey.sum_of_squares(&held_back, theta));
+    let (theta, remaining) = match of_fit < of_model {
+        true => (theta, remaining),
         // What was learned is no better by no more than its own uncertainty: the log confirms the model.
-        false if of_fit - of_model < theta.len() as f64 => (model.clone(), left),
+        false if of_fit - of_model < theta.len() as f64 => (model.clone(), remaining),
         false => (model.clone(), model_error),
     };
-    let unexplained = grey.unexplained(&held_back, &theta);
+    let deviations = grey.residual_deviation(&held_back, &theta);
     let percents = [&theta, &model].map(|theta| grey.percent(&held_back, theta));
     let [of_fit, of_model] = percents;
     let fitted = grey.matrices(&theta).into_iter();
     let noise = grey.noise(&learn, &theta);
-    let deviations = unexplained.into_iter().zip(noise);
+    let deviations = deviations.into_iter().zip(noise);
     let each = fitted.zip(of_fit).zip(of_model).zip(deviations);
     Ok(each
         .map(|(((found, fit), fit_of_model), (deviation, noise))| {
-            let [a, b, e, c, f] = found.all().map(plain);
+            let [a, b, c, e, f] = [&found.a, &found.b, &found.c, &found.e, &found.f].map(plain);
             Fit {
                 mode: FittedMode::new([a, b, c, e, f], fit, fit_of_model),
                 noise: noise.inf(&deviation).as_slice().to_vec(),
                 deviation: deviation.as_slice().to_vec(),
-                model_error: left.max(LEAST_ERROR.min(model_error)),
+                model_error: remaining.max(LEAST_ERROR.min(model_error)),
             }
         })
         .collect())

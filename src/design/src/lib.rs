@@ -77,7 +77,9 @@ pub use proof::{ControlProof, ObserverProof, Proof};
 pub use request::RequestError;
 pub use running_loop::{LostSensors, RunningLoop, SwitchingGain};
 pub use solver::{Run, Solver, Step};
-pub use spec::{ControlSpec, Objective, ObserverChoice, ObserverSpec, SpecError};
+pub use spec::{
+    ControlSpec, DecayRate, Objective, ObserverChoice, ObserverSpec, SpecError, Weight,
+};
 pub use state_feedback::{ModeGains, StateFeedback};
 pub use steady_state::steady_state;
 pub use synthesis::{Failure, Synthesis};

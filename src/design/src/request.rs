@@ -36,7 +36,7 @@ pub enum RequestError {
     /// The response length is out of its range.
     #[error(
         "the response length is {length} samples, but with {inputs} inputs it must lie between 1 and {most}: \
-         set estimator.response_length, or choose a longer sample_time"
+         ask for another length, or choose a longer sample time"
     )]
     ResponseLength {
         /// In samples.
@@ -98,7 +98,7 @@ pub enum RequestError {
     /// No controller can hold an operating point beyond the limits.
     #[error(
         "mode {mode}: its operating point has {value} at input {input}, which is limited to {}: give \
-         operating_point.u within signals.inputs, or other limits",
+         an operating point within the limits, or other limits",
         interval(*min, *max)
     )]
     OperatingInput {
@@ -115,14 +115,14 @@ pub enum RequestError {
     },
     /// Bumpless transfer cannot be proved.
     #[error(
-        "controller.bumpless = true cannot be proved for this design: set it to false, ask for another decay, or for \
-         lyapunov = \"dwell\""
+        "bumpless transfer cannot be proved for this design: do without it, ask for another decay, or for the dwell \
+         guarantee"
     )]
     Bumpless,
     /// Part of the disturbance does not show in the outputs at once.
     #[error(
         "no unknown input observer exists for mode {mode}{}: rank(C E) = {seen}, but rank(E) = {wanted}, \
-         so part of the disturbance does not show in the outputs at once; use a luenberger observer or more sensors",
+         so part of the disturbance does not show in the outputs at once; use a Luenberger observer or more sensors",
         entering(*mode, *successor)
     )]
     HiddenDisturbance {
@@ -137,7 +137,8 @@ pub enum RequestError {
     },
     /// There is nothing to decouple.
     #[error(
-        "an unknown input observer needs a disturbance on the state (E), but there is none: use luenberger or auto"
+        "an unknown input observer needs a disturbance on the state (E), but there is none: use a Luenberger observer, or leave the \
+         choice to the design"
     )]
     NoDisturbance,
     /// The outputs do not show an eigenvalue that decays too slowly.
@@ -188,8 +189,8 @@ fn entering(mode: usize, successor: usize) -> String {
 fn undetectable(mode: usize, decay: f64, magnitude: f64, decoupled: bool) -> String {
     let above = (magnitude * 1e4).ceil() / 1e4;
     let help = match (above < 1.0, decoupled) {
-        (true, _) => format!("ask for an observer.decay above {above:.4}"),
-        (false, true) => "use observer.kind = \"auto\" or more sensors".into(),
+        (true, _) => format!("ask for a decay of the observer above {above:.4}"),
+        (false, true) => "leave the choice of the observer to the design, or use more sensors".into(),
         (false, false) => {
             "no observer of any kind moves it: add a sensor that shows it, or take what grows out of the model if the \
              plant does not have it"

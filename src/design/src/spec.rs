@@ -5,6 +5,7 @@ use core::f64::consts::{PI, TAU};
 use ftc_plant::Dimensions;
 use ftc_plant::scaling::Scaling;
 use serde::{Deserialize, Serialize};
+use std::fmt;
 
 /// The state feedback that is asked for.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -38,7 +39,7 @@ pub struct ControlSpec {
 #[non_exhaustive]
 pub enum SpecError {
     /// No output is tracked.
-    #[error("tracked is empty: name at least one output")]
+    #[error("no output is tracked: name at least one")]
     NothingTracked,
     /// More outputs are tracked than there are inputs.
     #[error(
@@ -51,7 +52,7 @@ pub enum SpecError {
         inputs: usize,
     },
     /// An output that does not exist is tracked.
-    #[error("tracked names output {output}, but the plant has {outputs}")]
+    #[error("output {output} is to be tracked, but the plant has {outputs}: name one that it has")]
     UnknownOutput {
         /// The output.
         output: usize,
@@ -59,27 +60,26 @@ pub enum SpecError {
         outputs: usize,
     },
     /// An output is tracked twice.
-    #[error("tracked names output {0} twice")]
+    #[error("output {0} is to be tracked twice: name it once")]
     TrackedTwice(usize),
     /// The latency is neither 0 nor 1 samples.
-    #[error("latency is {0}: give 0 or 1 samples")]
+    #[error("the latency is {0} samples: give 0 or 1")]
     Latency(usize),
     /// A decay rate outside (0, 1].
-    #[error("{name} is {decay}: give a number above 0 and at most 1")]
+    #[error("{of} is {decay}: give a number above 0 and at most 1")]
     Decay {
         /// Which decay rate.
-        name: &'static str,
+        of: DecayRate,
         /// Its value.
         decay: f64,
     },
     /// Decay rate 1 under the dwell guarantee.
-    #[error("{0} = 1 gives no finite dwell time: give a number below 1")]
-    NoDwellTime(&'static str),
+    #[error("{0} is 1, which gives no finite dwell time: give a number below 1")]
+    NoDwellTime(DecayRate),
     /// A harmonic lies where no resonator can be told from the integrator or the highest frequency.
     #[error(
         "the internal model cannot hold harmonic {harmonic} of the disturbance, whose period is {samples:.6} samples: \
-         choose a sample_time at which it lies between {shortest:.4} and {longest:.0} samples, or use fewer harmonics or none \
-         (internal_model = false)"
+         choose a sample time at which it lies between {shortest:.4} and {longest:.0} samples, or use fewer harmonics or none"
     )]
     Harmonic {
         /// The harmonic.
@@ -102,18 +102,59 @@ pub enum SpecError {
         angle: f64,
     },
     /// A list of weights has the wrong length.
-    #[error("{weight} has {found} entries: give one number or {needed}")]
+    #[error("the {weight} weight has {found} entries: give {needed}")]
     WeightCount {
-        /// Which weights.
-        weight: &'static str,
+        /// Which weight.
+        weight: Weight,
         /// Entries found.
         found: usize,
         /// Entries needed.
         needed: usize,
     },
     /// A weight is negative, infinite or no number.
-    #[error("{0} must be finite and not negative")]
-    Weight(&'static str),
+    #[error("the {0} weight has an entry that is negative or not finite: give numbers from 0 on")]
+    Weight(Weight),
+}
+
+/// One of the weights of (T2).
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum Weight {
+    /// `W_y`, of the tracked outputs.
+    Output,
+    /// `W_z`, of the integrators.
+    Integral,
+    /// `W_u`, of the inputs.
+    Input,
+}
+
+impl fmt::Display for Weight {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::Output => "output",
+            Self::Integral => "integral",
+            Self::Input => "input",
+        })
+    }
+}
+
+/// One of the two decay rates that are asked for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum DecayRate {
+    /// `alpha`, of the state feedback.
+    Feedback,
+    /// `beta`, of the observer's error.
+    Observer,
+}
+
+impl fmt::Display for DecayRate {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::Feedback => "the decay of the feedback",
+            Self::Observer => "the decay of the observer",
+        })
+    }
 }
 
 /// What the gains are chosen for.
@@ -204,22 +245,22 @@ impl ControlSpec {
         if self.latency > 1 {
             return Err(SpecError::Latency(self.latency));
         }
-        check_decay("decay", self.decay, self.lyapunov)?;
+        check_decay(DecayRate::Feedback, self.decay, self.lyapunov)?;
         check_resonators(&self.resonators)?;
-        for (name, weights, size) in [
-            ("output_weight", &self.output_weight, r),
-            ("integral_weight", &self.integral_weight, r),
-            ("input_weight", &self.input_weight, dims.inputs),
+        for (weight, weights, size) in [
+            (Weight::Output, &self.output_weight, r),
+            (Weight::Integral, &self.integral_weight, r),
+            (Weight::Input, &self.input_weight, dims.inputs),
         ] {
             if weights.len() != size {
                 return Err(SpecError::WeightCount {
-                    weight: name,
+                    weight,
                     found: weights.len(),
                     needed: size,
                 });
             }
             if weights.iter().any(|w| !w.is_finite() || *w < 0.0) {
-                return Err(SpecError::Weight(name));
+                return Err(SpecError::Weight(weight));
             }
         }
         Ok(())
@@ -256,12 +297,12 @@ fn check_resonators(angles: &[f64]) -> Result<(), SpecError> {
 }
 
 /// A decay rate lies in (0, 1]; strictly below 1 where a dwell time must come out of it.
-fn check_decay(name: &'static str, decay: f64, lyapunov: Lyapunov) -> Result<(), SpecError> {
+fn check_decay(of: DecayRate, decay: f64, lyapunov: Lyapunov) -> Result<(), SpecError> {
     if !(decay > 0.0 && decay <= 1.0) {
-        return Err(SpecError::Decay { name, decay });
+        return Err(SpecError::Decay { of, decay });
     }
     if lyapunov == Lyapunov::Dwell && decay == 1.0 {
-        return Err(SpecError::NoDwellTime(name));
+        return Err(SpecError::NoDwellTime(of));
     }
     Ok(())
 }
@@ -329,6 +370,6 @@ impl ObserverSpec {
     /// # Errors
     /// The decay rate is out of its range.
     pub fn check(&self) -> Result<(), SpecError> {
-        check_decay("the observer's decay", self.decay, self.lyapunov)
+        check_decay(DecayRate::Observer, self.decay, self.lyapunov)
     }
 }

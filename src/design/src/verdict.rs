@@ -20,7 +20,8 @@ pub struct ConflictingBlock {
     pub weight: f64,
 }
 
-/// A change of the design that was tried, all the way to certified gains, and works.
+/// A change of the design that was tried, all the way to certified gains, and works. In its sentence outputs
+/// count from 1.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 #[non_exhaustive]
@@ -78,39 +79,33 @@ impl fmt::Display for Advice {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Decay(decay) => {
-                write!(f, "a slower decay is feasible: controller.decay = {decay}")
+                write!(f, "a slower decay of the feedback is feasible: {decay}")
             }
             Self::Lyapunov(kind) => {
-                write!(
-                    f,
-                    "another guarantee is feasible: controller.lyapunov = \"{kind}\""
-                )
+                write!(f, "another guarantee is feasible: {kind}")
             }
-            Self::ObserverDecay(decay) => write!(
-                f,
-                "a slower decay of the observer is feasible: observer.decay = {decay}"
-            ),
-            Self::ObserverLyapunov(kind) => write!(
-                f,
-                "another guarantee is feasible for the observer: controller.lyapunov = \"{kind}\""
-            ),
+            Self::ObserverDecay(decay) => {
+                write!(f, "a slower decay of the observer is feasible: {decay}")
+            }
+            Self::ObserverLyapunov(kind) => {
+                write!(f, "another guarantee is feasible for the observer: {kind}")
+            }
             Self::LyapunovAndDecay(kind, decay) => write!(
                 f,
-                "another guarantee with a slower decay is feasible: controller.lyapunov = \"{kind}\", controller.decay = {decay}"
+                "another guarantee with a slower decay is feasible: {kind} with {decay}"
             ),
-            Self::Harmonics(0) => write!(
-                f,
-                "integral action alone is feasible: controller.internal_model = false"
-            ),
+            Self::Harmonics(0) => {
+                f.write_str("integral action without an internal model is feasible")
+            }
             Self::Harmonics(count) => write!(
                 f,
-                "an internal model of fewer harmonics is feasible: disturbance.harmonics = {count}"
+                "an internal model of fewer harmonics is feasible: {count}"
             ),
             Self::Tracked(outputs) => {
                 let numbers: Vec<String> = outputs.iter().map(|o| (o + 1).to_string()).collect();
                 write!(
                     f,
-                    "tracking fewer outputs is feasible: controller.tracked = [{}]",
+                    "tracking fewer outputs is feasible: {}",
                     numbers.join(", ")
                 )
             }
@@ -130,29 +125,31 @@ pub struct Infeasibility {
     pub advice: Vec<Advice>,
 }
 
-impl fmt::Display for Infeasibility {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(
-            f,
-            "the design is infeasible (best margin {:.1e})",
-            self.margin
-        )?;
+impl Infeasibility {
+    /// What conflicts, in words, without what helps.
+    pub fn conflict(&self) -> String {
+        let margin = format!("the design is infeasible (best margin {:.1e})", self.margin);
         let heavy: Vec<String> = self
             .blocks
             .iter()
             .take(4)
             .map(|block| format!("{} ({:.0} %)", block.name, 100.0 * block.weight))
             .collect();
-        if !heavy.is_empty() {
-            write!(f, ": these conflict: {}", heavy.join(", "))?;
+        match heavy.is_empty() {
+            true => margin,
+            false => format!("{margin}: these conflict: {}", heavy.join(", ")),
         }
-        match self.advice.is_empty() {
-            true => write!(
-                f,
-                "; none of the usual changes (slower decay, dwell, fewer tracked outputs) helps"
-            ),
-            false => write!(f, "; {}", join(&self.advice)),
-        }
+    }
+}
+
+impl fmt::Display for Infeasibility {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let help = match self.advice.is_empty() {
+            true => "none of the usual changes (slower decay, dwell, fewer tracked outputs) helps"
+                .into(),
+            false => join(&self.advice),
+        };
+        write!(f, "{}; {help}", self.conflict())
     }
 }
 

@@ -4,6 +4,7 @@
 //! part of `v` is small at every frequency can be changed without changing `gamma`, and so shapes
 //! the gains hardly; where only one part is large, its weight scales `gamma` and shapes nothing either.
 
+use crate::Weight;
 use crate::augmented::augment;
 use crate::running_loop::frequency::Response;
 use crate::state_feedback::{StateFeedback, scaled_gain};
@@ -13,18 +14,6 @@ use nalgebra::DMatrix;
 /// Part of the performance signal, by l2 gain, below which a weight counts as idle: the square of its gain is
 /// then less than half a percent of that of the whole.
 const IDLE: f64 = 0.07;
-
-/// One of the weights of (T2).
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-#[non_exhaustive]
-pub enum Weight {
-    /// `W_y`, of the tracked outputs.
-    Output,
-    /// `W_z`, of the integrators.
-    Integral,
-    /// `W_u`, of the inputs.
-    Input,
-}
 
 /// The l2 gain from the disturbance to what each weight weighs, over that to all of it, with the state
 /// known: the largest of all modes.

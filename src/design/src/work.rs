@@ -8,7 +8,7 @@ use crate::{ControlSpec, Lyapunov};
 use ftc_plant::Dimensions;
 
 /// The most memory that a design may take for its Newton matrix, in bytes.
-const MOST_BYTES: f64 = 4e9;
+pub const MOST_BYTES: f64 = 4e9;
 
 /// Iterations of a usual solution and of the one that centres it.
 const ITERATIONS: f64 = 40.0;
@@ -65,7 +65,7 @@ fn others(lyapunov: Lyapunov) -> &'static str {
     match lyapunov {
         Lyapunov::Dwell => "",
         Lyapunov::Common | Lyapunov::Switched => {
-            ", or set controller.lyapunov = \"dwell\", which solves one mode at a time"
+            ", or ask for the dwell guarantee, which solves one mode at a time"
         }
     }
 }

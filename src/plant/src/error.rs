@@ -8,7 +8,7 @@ pub enum PlantError {
     #[error("the plant has no mode: give at least one")]
     NoMode,
     /// The sample time (seconds) is not positive.
-    #[error("sample_time is {0}: give a positive number of seconds")]
+    #[error("the sample time is {0}: give a positive number of seconds")]
     SampleTime(f64),
     /// A size is zero.
     #[error("mode 1 has no {0}: give at least one")]
@@ -58,7 +58,7 @@ pub enum PlantError {
     },
     /// A part of an operating point has the wrong length.
     #[error(
-        "mode {mode}: operating_point.{part} has {found} entries: give the {needed} that the plant needs"
+        "mode {mode}: {part} of the operating point has {found} entries: give the {needed} that the plant needs"
     )]
     OperatingPointLength {
         /// The mode.
@@ -71,7 +71,7 @@ pub enum PlantError {
         needed: usize,
     },
     /// A part of an operating point is infinite or no number.
-    #[error("mode {mode}: operating_point.{part} is not finite")]
+    #[error("mode {mode}: {part} of the operating point is not finite: give numbers")]
     OperatingPointNotFinite {
         /// The mode.
         mode: usize,

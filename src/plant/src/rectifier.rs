@@ -248,8 +248,8 @@ pub enum RectifierError {
     },
     /// The diodes hold the DC link above the voltage that is asked for.
     #[error(
-        "dc_voltage is {given} V, but the diodes hold the link at sqrt(3) times phase_voltage, {diodes:.1} V: \
-         give a dc_voltage above it"
+        "the DC voltage is {given} V, but the diodes hold the link at sqrt(3) times the phase voltage, {diodes:.1} V: \
+         give a DC voltage above it"
     )]
     DcVoltage {
         /// Asked for, in V.

@@ -240,7 +240,35 @@ impl DesignRecord {
         }
         let plant = &self.plant;
         let dims = Dimensions::check(plant)?;
+        self.check_counts(dims)?;
         let modes = plant.modes.len();
+        let scenario = &self.scenario;
+        let tracked = &self.controller.feedback.tracked;
+        let memory = self.controller.estimator.check_memory(dims.inputs);
+        memory.map_err(RecordError::Memory)?;
+        if tracked.iter().any(|&row| row >= dims.outputs) {
+            return Err(RecordError::Tracked(dims.outputs));
+        }
+        if scenario
+            .schedule
+            .iter()
+            .any(|interval| interval.mode >= modes)
+        {
+            return Err(RecordError::Schedule(modes));
+        }
+        let (motion, deviation) = self.true_plant.clone().into_parts();
+        deviation.check(plant)?;
+        if let TruePlant::Linear { plant: truth } = &motion
+            && (Dimensions::check(truth)? != dims || truth.modes.len() != modes)
+        {
+            return Err(RecordError::TruePlant);
+        }
+        Ok(())
+    }
+
+    /// Whether there is one of everything that the plant's sizes ask for.
+    fn check_counts(&self, dims: Dimensions) -> Result<(), RecordError> {
+        let modes = self.plant.modes.len();
         let scenario = &self.scenario;
         let tracked = &self.controller.feedback.tracked;
         let predicted = match self.controller.estimator.method {
@@ -293,25 +321,6 @@ impl DesignRecord {
                     needed,
                 });
             }
-        }
-        let memory = self.controller.estimator.check_memory(dims.inputs);
-        memory.map_err(RecordError::Memory)?;
-        if tracked.iter().any(|&row| row >= dims.outputs) {
-            return Err(RecordError::Tracked(dims.outputs));
-        }
-        if scenario
-            .schedule
-            .iter()
-            .any(|interval| interval.mode >= modes)
-        {
-            return Err(RecordError::Schedule(modes));
-        }
-        let (motion, deviation) = self.true_plant.clone().into_parts();
-        deviation.check(plant)?;
-        if let TruePlant::Linear { plant: truth } = &motion
-            && (Dimensions::check(truth)? != dims || truth.modes.len() != modes)
-        {
-            return Err(RecordError::TruePlant);
         }
         Ok(())
     }

@@ -1,5 +1,6 @@
 //! Why a command ends without success, and with which exit code.
 
+use design_file::wording;
 use ftc_design::{ControlSpec, DesignError};
 use report::summary;
 use std::fmt;
@@ -37,7 +38,9 @@ impl Failure {
     pub fn new(path: &Path, asked: ControlSpec, error: ftc_design::Failure) -> Self {
         let file = path.display().to_string();
         match error.error {
-            DesignError::Request(what) => Self::Input(format!("{file}: {what}")),
+            DesignError::Request(what) => {
+                Self::Input(format!("{file}: {}", wording::of_request(&what)))
+            }
             _ => Self::NoDesign {
                 file,
                 asked: Box::new(asked),
@@ -115,7 +118,9 @@ impl fmt::Display for Failure {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Input(what) => f.write_str(what),
-            Self::NoDesign { file, error, .. } => write!(f, "{file}: {error}"),
+            Self::NoDesign { file, error, .. } => {
+                write!(f, "{file}: {}", wording::of_error(&error.error))
+            }
             Self::Refused { file, what, .. } => write!(f, "{file}: {what}"),
         }
     }

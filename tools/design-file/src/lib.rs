@@ -2,7 +2,7 @@
 //! one sentence that says what is wrong with which key.
 //!
 //! [`schema`] is what a file may hold, [`defaults`] what an absent key means, [`check`] what a value
-//! must satisfy. [`identification`] writes a design file from logs, [`examples`] are some to start from.
+//! must satisfy; [`wording`] says why there is no design. [`identification`] writes a design file from logs, [`examples`] are some to start from.
 //!
 //! ```
 //! use std::path::Path;
@@ -44,6 +44,7 @@ mod signal;
 pub mod suggest;
 mod true_plant;
 pub mod values;
+pub mod wording;
 
 pub use error::Error;
 use ftc_design::assembly::Request;

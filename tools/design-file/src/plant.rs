@@ -5,6 +5,7 @@ use crate::check::{self, ValueError};
 use crate::notes::Notes;
 use crate::schema::{self, DesignFile, PlantModel};
 use crate::values::Matrix;
+use crate::wording;
 use ftc_plant::rows;
 use ftc_plant::{Dimensions, Mode, OperatingPoint, SwitchedPlant};
 use ftc_tables::matrices::Matrices;
@@ -524,10 +525,11 @@ fn linearised(model: &PlantModel, sample_time: f64) -> Result<SwitchedPlant, Str
             rectifier.loads.len()
         ));
     }
-    at("plant:", rectifier.linearise(sample_time))
+    let linearised = rectifier.linearise(sample_time);
+    linearised.map_err(|error| wording::of_rectifier(&error))
 }
 
 /// The sizes of a plant, or which matrix of which mode does not fit.
 fn sized(plant: &SwitchedPlant) -> Result<Dimensions, String> {
-    Dimensions::check(plant).map_err(|error| error.to_string())
+    Dimensions::check(plant).map_err(|error| wording::of_plant(&error))
 }

@@ -1,5 +1,6 @@
 //! Exceptions of `ftc_fmu.errors`, with the parts of their sentences.
 
+use design_file::wording;
 use ftc_design::DesignError;
 use pyo3::prelude::*;
 use pyo3::types::PyTuple;
@@ -56,16 +57,16 @@ fn without_position(sentence: &str) -> &str {
 /// There is no such controller.
 pub fn of_design(py: Python<'_>, error: &DesignError, text: &str, author: Author<'_>) -> PyErr {
     let sentence = match author {
-        Author::User(file) => format!("{file}: {error}"),
-        Author::Package => error.to_string(),
+        Author::User(file) => format!("{file}: {}", wording::of_error(error)),
+        Author::Package => wording::of_error(error),
     };
     let advice = |advice: &[ftc_design::Advice]| -> Vec<String> {
-        advice.iter().map(ToString::to_string).collect()
+        advice.iter().map(wording::of_advice).collect()
     };
     match error {
         DesignError::Request(what) => of_input(
             py,
-            design_file::Error::of_request(text, what.to_string()),
+            design_file::Error::of_request(text, wording::of_request(what)),
             author,
         ),
         DesignError::Infeasible(found) => {

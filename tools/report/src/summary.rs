@@ -3,6 +3,7 @@
 use crate::running_loop;
 use crate::text::{count, number, with_units};
 use crate::warnings;
+use design_file::wording;
 use ftc_control::parameters::{Compensation, EstimatorMethod, Hypotheses, ObserverKind};
 use ftc_design::apart;
 use ftc_design::augmented::assumes_input_disturbance;
@@ -241,32 +242,7 @@ fn estimator(design: &Design) -> Vec<(String, String)> {
     }
     let outputs = &design.signals.outputs;
     if let Some(settings) = &estimator.hypotheses {
-        let source = match settings.fitted.is_empty() {
-            true => "assumed",
-            false => "left after the fit to the log",
-        };
-        let error = number(100.0 * settings.model_error);
-        lines.push(line(
-            "model error",
-            format!("{error} % of each entry, {source}"),
-        ));
-        lines.extend(fitted(design, settings));
-        if !settings.fitted.is_empty() {
-            lines.push(line(
-                "noise in the log",
-                with_units(&settings.noise, outputs, 3),
-            ));
-        }
-        lines.push(line(
-            "fault rate",
-            format!("{:e} a sample and sensor", settings.fault_rate),
-        ));
-        lines.push(line("slow divergence", ambiguous(settings)));
-        lines.extend(found_mode(design, settings));
-        lines.push(line(
-            "largest correction",
-            with_units(&settings.authority, outputs, 3),
-        ));
+        lines.extend(hypotheses(design, settings));
     } else {
         lines.push(line(
             "response length",
@@ -313,6 +289,38 @@ fn estimator(design: &Design) -> Vec<(String, String)> {
             ),
         ));
     }
+    lines
+}
+
+/// Of the state-based method.
+fn hypotheses(design: &Design, settings: &Hypotheses) -> Vec<(String, String)> {
+    let outputs = &design.signals.outputs;
+    let source = match settings.fitted.is_empty() {
+        true => "assumed",
+        false => "left after the fit to the log",
+    };
+    let error = number(100.0 * settings.model_error);
+    let mut lines = vec![line(
+        "model error",
+        format!("{error} % of each entry, {source}"),
+    )];
+    lines.extend(fitted(design, settings));
+    if !settings.fitted.is_empty() {
+        lines.push(line(
+            "noise in the log",
+            with_units(&settings.noise, outputs, 3),
+        ));
+    }
+    lines.push(line(
+        "fault rate",
+        format!("{:e} a sample and sensor", settings.fault_rate),
+    ));
+    lines.push(line("slow divergence", ambiguous(settings)));
+    lines.extend(found_mode(design, settings));
+    lines.push(line(
+        "largest correction",
+        with_units(&settings.authority, outputs, 3),
+    ));
     lines
 }
 
@@ -429,7 +437,7 @@ pub fn json_of_failure(asked: &ControlSpec, failure: &Failure) -> String {
         }
         _ => (Value::Null, Vec::new(), [].as_slice()),
     };
-    let advice: Vec<String> = advice.iter().map(ToString::to_string).collect();
+    let advice: Vec<String> = advice.iter().map(wording::of_advice).collect();
     pretty(&json!({
         "feasible": feasible,
         "certified": false,
@@ -446,7 +454,7 @@ pub fn json_of_failure(asked: &ControlSpec, failure: &Failure) -> String {
         "latency": asked.latency,
         "blocks": blocks,
         "advice": advice,
-        "reason": failure.to_string(),
+        "reason": wording::of_error(&failure.error),
     }))
 }
 

@@ -3,10 +3,11 @@
 use crate::text::{count, number};
 use design_file::schema::{DesignFile, ObserverKind};
 use design_file::sentence::shorten;
+use design_file::wording::weight_key;
 use ftc_design::state_feedback::REJECTION;
 use ftc_design::warnings::{Doubt, Guess, LoggedMovement, Warning};
-use ftc_design::weights::{Weight, WeightShares};
-use ftc_design::{Design, Objective};
+use ftc_design::weights::WeightShares;
+use ftc_design::{Design, Objective, Weight};
 use ftc_plant::deviation::Destabilised;
 use ftc_simulate::warnings::{RunWarning, RunWatch};
 use std::fmt::Write;
@@ -26,15 +27,6 @@ pub fn of_design(
     unknown.into_iter().chain(idle).chain(sentences).collect()
 }
 
-/// The key of a weight.
-fn key(weight: Weight) -> &'static str {
-    match weight {
-        Weight::Output => "output_weight",
-        Weight::Integral => "integral_weight",
-        _ => "input_weight",
-    }
-}
-
 /// Weights that were given.
 fn given_weights(file: &DesignFile) -> Vec<Weight> {
     let asked = &file.controller;
@@ -50,10 +42,7 @@ fn given_weights(file: &DesignFile) -> Vec<Weight> {
 /// Weights that were given and shape nothing.
 fn idle_weights(file: &DesignFile, design: &Design) -> Option<String> {
     let given = given_weights(file);
-    let names: Vec<String> = given
-        .iter()
-        .map(|weight| format!("controller.{}", key(*weight)))
-        .collect();
+    let names: Vec<&str> = given.iter().map(|weight| weight_key(*weight)).collect();
     let control = &design.proof.as_ref()?.state_feedback;
     let reason = match (&control.gamma, control.objective) {
         (_, Objective::Decay) => {
@@ -95,17 +84,14 @@ fn weak_weights(given: &[Weight], design: &Design) -> Option<String> {
     if weak.is_empty() {
         return None;
     }
-    let names: Vec<String> = weak
-        .iter()
-        .map(|weight| format!("controller.{}", key(*weight)))
-        .collect();
+    let names: Vec<&str> = weak.iter().map(|weight| weight_key(*weight)).collect();
     let have = if weak.len() == 1 { "has" } else { "have" };
     let times = |share: f64| number((0.5 / share.max(1e-12)).ceil());
     let reason = match alone {
         Some(weight) => format!(
-            "controller.{} alone decides gamma, and only the weights' ratios shape the gains: make it {} times \
+            "{} alone decides gamma, and only the weights' ratios shape the gains: make it {} times \
              smaller, or the others larger",
-            key(weight),
+            weight_key(weight),
             times(shares.largest_idle())
         ),
         None => {

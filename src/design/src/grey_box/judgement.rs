@@ -1,19 +1,20 @@
 //! What the fitted matrices leave: of which size, how white, and in percent.
 
 use super::model::GreyBox;
-use super::windows::{Window, samples_of};
+use super::windows::{Segment, samples_of};
 use nalgebra::DVector;
 
 impl GreyBox<'_> {
-    /// Sum of squares of what is left of each output (p) in each mode, output units.
-    pub(super) fn squares(&self, windows: &[Window], theta: &DVector<f64>) -> Vec<DVector<f64>> {
+    /// Sum of squares of the residual of each output (p) in each mode, output units.
+    pub(super) fn squares(&self, windows: &[Segment], theta: &DVector<f64>) -> Vec<DVector<f64>> {
         let p = self.deviation[0].len();
         let modes = self.matrices(theta);
         let mut sums = vec![DVector::zeros(p); modes.len()];
         for window in windows {
-            let rest = self.explain(window, &modes).rest;
-            for (&mode, rest) in window.modes.iter().zip(rest.as_slice().chunks_exact(p)) {
-                for (q, value) in rest.iter().enumerate() {
+            let residual = self.explain(window, &modes).residual;
+            let samples = residual.as_slice().chunks_exact(p);
+            for (&mode, sample) in window.modes.iter().zip(samples) {
+                for (q, value) in sample.iter().enumerate() {
                     sums[mode][q] += (value * self.deviation[mode][q]).powi(2);
                 }
             }
@@ -21,40 +22,40 @@ impl GreyBox<'_> {
         sums
     }
 
-    /// Standard deviation of what is left of each sensor (p) in each mode, output units.
-    pub(super) fn unexplained(
+    /// Standard deviation of the residual of each sensor (p) in each mode, output units.
+    pub(super) fn residual_deviation(
         &self,
-        windows: &[Window],
+        windows: &[Segment],
         theta: &DVector<f64>,
     ) -> Vec<DVector<f64>> {
         let p = self.deviation[0].len() as f64;
         let s = self.modes[0].e.ncols();
         let n = self.modes[0].a.nrows();
-        let free = |window: &Window| {
-            let own = n + window.waves.ncols() * s;
-            1.0 - own as f64 / (p * window.modes.len() as f64)
+        let free = |window: &Segment| {
+            let nuisance = n + window.waves.ncols() * s;
+            1.0 - nuisance as f64 / (p * window.modes.len() as f64)
         };
         let squares = self.squares(windows, theta);
         let each = squares.into_iter().enumerate().map(|(mode, squares)| {
-            let own = |window: &Window| {
+            let of_window = |window: &Segment| {
                 free(window) * samples_of(std::slice::from_ref(window), mode) as f64
             };
-            let free: f64 = windows.iter().map(own).sum();
+            let free: f64 = windows.iter().map(of_window).sum();
             squares.map(|sum| (sum / free).sqrt().max(f64::MIN_POSITIVE.sqrt()))
         });
         each.collect()
     }
 
-    /// Standard deviation of each sensor's noise (p) in each mode: what is left moves slowly but for it, so that it
+    /// Standard deviation of each sensor's noise (p) in each mode: but for it the residual moves slowly, so that it
     /// is what one sample differs from the next by.
-    pub(super) fn noise(&self, windows: &[Window], theta: &DVector<f64>) -> Vec<DVector<f64>> {
+    pub(super) fn noise(&self, windows: &[Segment], theta: &DVector<f64>) -> Vec<DVector<f64>> {
         let p = self.deviation[0].len();
         let modes = self.matrices(theta);
         let mut sums = vec![(DVector::<f64>::zeros(p), 0.0_f64); modes.len()];
         for window in windows {
-            let rest = self.explain(window, &modes).rest;
-            let rests: Vec<&[f64]> = rest.as_slice().chunks_exact(p).collect();
-            for (pair, mode) in rests.windows(2).zip(window.modes.windows(2)) {
+            let residual = self.explain(window, &modes).residual;
+            let samples: Vec<&[f64]> = residual.as_slice().chunks_exact(p).collect();
+            for (pair, mode) in samples.windows(2).zip(window.modes.windows(2)) {
                 let [one, next] = [mode[0], mode[1]];
                 if one == next {
                     let steps = pair[0]
@@ -74,9 +75,9 @@ impl GreyBox<'_> {
     }
 
     /// 100 (1 - |y - fitted| / |y - mean|) of each output in each mode over the windows.
-    pub(super) fn percent(&self, windows: &[Window], theta: &DVector<f64>) -> Vec<Vec<f64>> {
+    pub(super) fn percent(&self, windows: &[Segment], theta: &DVector<f64>) -> Vec<Vec<f64>> {
         let squares = self.squares(windows, theta);
-        let each = squares.iter().enumerate().map(|(mode, left)| {
+        let each = squares.iter().enumerate().map(|(mode, squares)| {
             let read = |q: usize| {
                 let windows = windows.iter().flat_map(move |window| {
                     let of = window
@@ -89,10 +90,10 @@ impl GreyBox<'_> {
                 });
                 DVector::from_vec(windows.collect::<Vec<_>>())
             };
-            let outputs = left.iter().enumerate().map(|(q, left)| {
+            let outputs = squares.iter().enumerate().map(|(q, squares)| {
                 let read = read(q);
                 let all = read.add_scalar(-read.mean()).norm_squared();
-                100.0 * (1.0 - (left / all.max(f64::MIN_POSITIVE)).sqrt())
+                100.0 * (1.0 - (squares / all.max(f64::MIN_POSITIVE)).sqrt())
             });
             outputs.collect()
         });

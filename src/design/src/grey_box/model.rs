@@ -1,7 +1,7 @@
 //! What the modes' matrices explain of a window, and how that changes with each of them.
 
-use super::parameters::{Entry, Matrices, OUTPUT, Parameter};
-use super::windows::Window;
+use super::parameters::{Entry, Matrices, MatrixName, Parameter};
+use super::windows::Segment;
 use ftc_plant::Mode;
 use nalgebra::{DMatrix, DVector};
 
@@ -15,15 +15,15 @@ pub(super) struct GreyBox<'a> {
     /// Standard deviation of each sensor (p) in each mode.
     pub(super) deviation: Vec<DVector<f64>>,
     /// The usual movement: inputs that jump at random between nominal values.
-    pub(super) usual: Vec<Window>,
+    pub(super) usual: Vec<Segment>,
 }
 
 /// A window under given matrices, outputs in units of the sensors' deviations.
 pub(super) struct Explained {
-    /// What is left of the readings (samples p).
-    pub(super) rest: DVector<f64>,
-    /// An orthonormal basis of what the window's own unknowns can do to the outputs (samples p x unknowns).
-    pub(super) span: DMatrix<f64>,
+    /// Residual of the readings (samples p).
+    pub(super) residual: DVector<f64>,
+    /// An orthonormal basis of what the nuisance parameters can do to the outputs (samples p x parameters).
+    pub(super) basis: DMatrix<f64>,
     /// States that explain the readings (n x samples).
     pub(super) states: DMatrix<f64>,
     /// The disturbance that does (s x samples).
@@ -41,7 +41,7 @@ impl GreyBox<'_> {
                     row,
                     column,
                 } = of.entry;
-                modes[mode].all_mut()[matrix][(row, column)] = value;
+                modes[mode].get_mut(matrix)[(row, column)] = value;
             }
         }
         modes
@@ -50,7 +50,7 @@ impl GreyBox<'_> {
     /// States (n x samples) from `x` on under the `drive` (n x samples).
     pub(super) fn run(
         modes: &[Matrices],
-        window: &Window,
+        window: &Segment,
         x: DVector<f64>,
         drive: &DMatrix<f64>,
     ) -> DMatrix<f64> {
@@ -64,7 +64,7 @@ impl GreyBox<'_> {
     }
 
     /// What the inputs do to the states (n x samples), and that the operating point changes with the mode.
-    fn input_drive(&self, modes: &[Matrices], window: &Window) -> DMatrix<f64> {
+    fn input_drive(&self, modes: &[Matrices], window: &Segment) -> DMatrix<f64> {
         let mut drive = DMatrix::zeros(modes[0].a.nrows(), window.modes.len());
         for (k, &mode) in window.modes.iter().enumerate() {
             let mut next = &modes[mode].b * window.u.column(k);
@@ -83,7 +83,7 @@ impl GreyBox<'_> {
     /// Outputs in units of the deviations, one sample below the other: of each sample its mode and its outputs.
     fn weighed(
         &self,
-        window: &Window,
+        window: &Segment,
         outputs: impl Fn(usize, usize) -> DVector<f64>,
     ) -> DVector<f64> {
         let p = self.deviation[0].len();
@@ -95,11 +95,12 @@ impl GreyBox<'_> {
         all
     }
 
-    /// What each of the window's own unknowns does: states (n x samples), and outputs in units of the deviations.
-    pub(super) fn own(
+    /// Response to each nuisance parameter of the window: states (n x samples), and outputs in units of the
+    /// deviations.
+    fn nuisance_responses(
         &self,
         modes: &[Matrices],
-        window: &Window,
+        window: &Segment,
     ) -> Vec<(DMatrix<f64>, DVector<f64>)> {
         let (n, samples) = (modes[0].a.nrows(), window.modes.len());
         let still = DMatrix::zeros(n, samples);
@@ -126,20 +127,23 @@ impl GreyBox<'_> {
     }
 
     /// What explains the readings of `window` best, and what it leaves.
-    pub(super) fn explain(&self, window: &Window, modes: &[Matrices]) -> Explained {
+    pub(super) fn explain(&self, window: &Segment, modes: &[Matrices]) -> Explained {
         let (n, s) = modes[0].e.shape();
         let drive = self.input_drive(modes, window);
         let mut states = Self::run(modes, window, DVector::zeros(n), &drive);
         let read = self.weighed(window, |k, mode| {
             window.y.column(k) - &modes[mode].c * states.column(k)
         });
-        let own = self.own(modes, window);
-        let columns: Vec<_> = own.iter().map(|(_, outputs)| outputs.clone()).collect();
+        let nuisance = self.nuisance_responses(modes, window);
+        let columns: Vec<_> = nuisance
+            .iter()
+            .map(|(_, outputs)| outputs.clone())
+            .collect();
         let free = DMatrix::from_columns(&columns);
         let mut disturbance = DMatrix::zeros(s, window.modes.len());
         let lost = Explained {
-            rest: DVector::from_element(read.len(), f64::INFINITY),
-            span: DMatrix::zeros(read.len(), 0),
+            residual: DVector::from_element(read.len(), f64::INFINITY),
+            basis: DMatrix::zeros(read.len(), 0),
             states: states.clone(),
             disturbance: disturbance.clone(),
         };
@@ -158,13 +162,13 @@ impl GreyBox<'_> {
         let (Some(u), Some(vt)) = (svd.u, svd.v_t) else {
             return lost;
         };
-        let span = u.columns(0, kept).into_owned();
-        let found = span.tr_mul(&read);
-        let rest = &read - &span * &found;
+        let basis = u.columns(0, kept).into_owned();
+        let found = basis.tr_mul(&read);
+        let residual = &read - &basis * &found;
         let coordinates = DVector::from_fn(kept, |k, _| found[k] / svd.singular_values[k]);
         let amounts = vt.rows(0, kept).tr_mul(&coordinates);
-        for ((of_own, _), amount) in own.iter().zip(amounts.iter()) {
-            states += of_own * *amount;
+        for ((response, _), amount) in nuisance.iter().zip(amounts.iter()) {
+            states += response * *amount;
         }
         let waves = window.waves.ncols();
         for channel in 0..s {
@@ -173,24 +177,24 @@ impl GreyBox<'_> {
             disturbance.set_row(channel, &course.transpose());
         }
         Explained {
-            rest,
-            span,
+            residual,
+            basis,
             states,
             disturbance,
         }
     }
 
-    /// How the rest of `window` falls with each parameter, without what the window's own unknowns can do
-    /// (samples p x parameters).
-    pub(super) fn slope(
+    /// Sensitivity of the outputs to each parameter, projected to what the nuisance parameters cannot do
+    /// (samples p x parameters): minus the Jacobian of the residual.
+    pub(super) fn sensitivity(
         &self,
-        window: &Window,
+        window: &Segment,
         modes: &[Matrices],
         found: &Explained,
     ) -> DMatrix<f64> {
         let (n, samples) = (modes[0].a.nrows(), window.modes.len());
         let p = self.deviation[0].len();
-        let mut slope = DMatrix::zeros(found.rest.len(), self.parameters.len());
+        let mut sensitivity = DMatrix::zeros(found.residual.len(), self.parameters.len());
         for (at, of) in self.parameters.iter().enumerate() {
             let mine = |mode: usize| f64::from(u8::from(of.modes.contains(&mode)));
             if !window.modes.iter().any(|mode| of.modes.contains(mode)) {
@@ -202,12 +206,12 @@ impl GreyBox<'_> {
                 column,
             } = of.entry;
             let factor = match matrix {
-                0 | OUTPUT => found.states.row(column),
-                1 => window.u.row(column),
-                _ => found.disturbance.row(column),
+                MatrixName::A | MatrixName::C => found.states.row(column),
+                MatrixName::B => window.u.row(column),
+                MatrixName::E | MatrixName::F => found.disturbance.row(column),
             };
             let signal = |k: usize, mode: usize| mine(mode) * factor[k];
-            let effect = if matrix < OUTPUT {
+            let effect = if matches!(matrix, MatrixName::A | MatrixName::B | MatrixName::E) {
                 let mut drive = DMatrix::zeros(n, samples);
                 for (k, &mode) in window.modes.iter().enumerate() {
                     drive[(row, k)] = signal(k, mode);
@@ -219,8 +223,8 @@ impl GreyBox<'_> {
                     DVector::from_fn(p, |q, _| if q == row { signal(k, mode) } else { 0.0 })
                 })
             };
-            slope.set_column(at, &effect);
+            sensitivity.set_column(at, &effect);
         }
-        &slope - &found.span * found.span.tr_mul(&slope)
+        &sensitivity - &found.basis * found.basis.tr_mul(&sensitivity)
     }
 }

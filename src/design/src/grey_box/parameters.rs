@@ -30,33 +30,50 @@ impl Matrices {
         }
     }
 
-    pub(super) fn all(&self) -> [&DMatrix<f64>; 5] {
-        [&self.a, &self.b, &self.e, &self.c, &self.f]
+    pub(super) fn get(&self, name: MatrixName) -> &DMatrix<f64> {
+        match name {
+            MatrixName::A => &self.a,
+            MatrixName::B => &self.b,
+            MatrixName::E => &self.e,
+            MatrixName::C => &self.c,
+            MatrixName::F => &self.f,
+        }
     }
 
-    pub(super) fn all_mut(&mut self) -> [&mut DMatrix<f64>; 5] {
-        [
-            &mut self.a,
-            &mut self.b,
-            &mut self.e,
-            &mut self.c,
-            &mut self.f,
-        ]
+    pub(super) fn get_mut(&mut self, name: MatrixName) -> &mut DMatrix<f64> {
+        match name {
+            MatrixName::A => &mut self.a,
+            MatrixName::B => &mut self.b,
+            MatrixName::E => &mut self.e,
+            MatrixName::C => &mut self.c,
+            MatrixName::F => &mut self.f,
+        }
     }
+}
+
+/// One of the matrices of a mode.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum MatrixName {
+    A,
+    B,
+    E,
+    C,
+    F,
+}
+
+impl MatrixName {
+    const ALL: [Self; 5] = [Self::A, Self::B, Self::E, Self::C, Self::F];
+    /// Those that a disturbance acts through.
+    pub(super) const OF_DISTURBANCE: [Self; 2] = [Self::E, Self::F];
 }
 
 /// Where an entry of a mode's matrices stands.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Entry {
-    /// Which of `A`, `B`, `E`, `C`, `F`.
-    pub(super) matrix: usize,
+    pub(super) matrix: MatrixName,
     pub(super) row: usize,
     pub(super) column: usize,
 }
-
-/// The matrix in [`Entry::matrix`] that maps states to outputs, and those that a disturbance acts through.
-pub(super) const OUTPUT: usize = 3;
-pub(super) const OF_DISTURBANCE: [usize; 2] = [2, 4];
 
 /// A number that is fitted.
 pub(super) struct Parameter {
@@ -80,12 +97,13 @@ pub(super) fn parameters(
     for (index, mode) in modes.iter().enumerate() {
         let matrices = Matrices::of(mode);
         let sizes = sizes(&matrices, scaling);
-        for (matrix, (values, sizes)) in matrices.all().into_iter().zip(&sizes).enumerate() {
-            if OF_DISTURBANCE.contains(&matrix) && !disturbance {
+        for matrix in MatrixName::ALL {
+            let (values, sizes) = (matrices.get(matrix), sizes.get(matrix));
+            if MatrixName::OF_DISTURBANCE.contains(&matrix) && !disturbance {
                 continue;
             }
             for row in 0..values.nrows() {
-                let same = |of: &Mode| matrix == OUTPUT && of.c.row(row) == mode.c.row(row);
+                let same = |of: &Mode| matrix == MatrixName::C && of.c.row(row) == mode.c.row(row);
                 let first = modes[..index].iter().position(same);
                 for column in 0..values.ncols() {
                     let entry = Entry {
@@ -115,8 +133,8 @@ pub(super) fn parameters(
     parameters
 }
 
-/// The size that the error of each entry of `A`, `B`, `E`, `C`, `F` is relative to.
-fn sizes(mode: &Matrices, scaling: &Scaling) -> [DMatrix<f64>; 5] {
+/// The size that the error of each entry is relative to.
+fn sizes(mode: &Matrices, scaling: &Scaling) -> Matrices {
     let (x, u, y) = (&scaling.states, &scaling.inputs, &scaling.outputs);
     let w = vec![1.0; mode.e.ncols()];
     let [a, b, c] = [(&mode.a, x, x), (&mode.b, x, u), (&mode.c, y, x)]
@@ -137,11 +155,11 @@ fn sizes(mode: &Matrices, scaling: &Scaling) -> [DMatrix<f64>; 5] {
     };
     let output = |i: usize, _: usize| c.row(i).amax();
     let [e, f] = [(&mode.e, x), (&mode.f, y)].map(|(matrix, to)| scaled(matrix, to, &w));
-    [
-        size(&mode.a, x, x, &motion),
-        size(&mode.b, x, u, &motion),
-        size(&mode.e, x, &w, &|_, j| e.column(j).amax()),
-        size(&mode.c, y, x, &output),
-        size(&mode.f, y, &w, &|_, j| f.column(j).amax()),
-    ]
+    Matrices {
+        a: size(&mode.a, x, x, &motion),
+        b: size(&mode.b, x, u, &motion),
+        e: size(&mode.e, x, &w, &|_, j| e.column(j).amax()),
+        c: size(&mode.c, y, x, &output),
+        f: size(&mode.f, y, &w, &|_, j| f.column(j).amax()),
+    }
 }

@@ -1,8 +1,8 @@
 //! The parameters that explain windows best: Gauss-Newton, and which matrices are worth a change.
 
 use super::model::GreyBox;
-use super::parameters::{OF_DISTURBANCE, OUTPUT};
-use super::windows::Window;
+use super::parameters::MatrixName;
+use super::windows::Segment;
 use nalgebra::{DMatrix, DVector};
 
 /// Steps of the iteration, at most; none improves by less than this share where it ends.
@@ -17,15 +17,15 @@ const LATE: f64 = 0.5;
 const KNOWN: f64 = 1e-6;
 
 impl GreyBox<'_> {
-    /// The parameters that explain the windows best, and the relative error of the model that is left. The maps to
+    /// The parameters that explain the windows best, and the relative error of the model that remains. The maps to
     /// the outputs and those of the disturbance are the design's unless the windows say otherwise: what is as probable without a
     /// change of theirs is not changed.
-    pub(super) fn choose(&mut self, windows: &[Window], model_error: f64) -> (DVector<f64>, f64) {
+    pub(super) fn choose(&mut self, windows: &[Segment], model_error: f64) -> (DVector<f64>, f64) {
         let prior = self.prior.clone();
-        let groups: [&[usize]; 2] = [&[OUTPUT], &OF_DISTURBANCE];
-        let mut fixed: Vec<usize> = groups.concat();
+        let groups: [&[MatrixName]; 2] = [&[MatrixName::C], &MatrixName::OF_DISTURBANCE];
+        let mut fixed: Vec<MatrixName> = groups.concat();
         self.prior = self.held(&prior, &fixed);
-        let (mut theta, mut left) = self.improve(windows, model_error);
+        let (mut theta, mut remaining) = self.improve(windows, model_error);
         for group in groups {
             let (before, known) = (fixed.clone(), self.prior.clone());
             fixed.retain(|matrix| !group.contains(matrix));
@@ -34,7 +34,7 @@ impl GreyBox<'_> {
             let with = self.evidence(windows, &freed);
             self.prior = known;
             if with > self.evidence(windows, &theta) {
-                (theta, left) = (freed, of_freed);
+                (theta, remaining) = (freed, of_freed);
                 self.prior = self.held(&prior, &fixed);
             } else {
                 fixed = before;
@@ -45,11 +45,11 @@ impl GreyBox<'_> {
                 theta[at] = of.design;
             }
         }
-        (theta, left)
+        (theta, remaining)
     }
 
     /// The `prior` if the `fixed` matrices are known.
-    pub(super) fn held(&self, prior: &DVector<f64>, fixed: &[usize]) -> DVector<f64> {
+    pub(super) fn held(&self, prior: &DVector<f64>, fixed: &[MatrixName]) -> DVector<f64> {
         let each = self.parameters.iter().zip(prior.iter());
         let each = each.map(|(of, prior)| match fixed.contains(&of.entry.matrix) {
             true => KNOWN * prior,
@@ -59,7 +59,7 @@ impl GreyBox<'_> {
     }
 
     /// Logarithm of the probability of the windows, up to a constant (Laplace).
-    fn evidence(&self, windows: &[Window], theta: &DVector<f64>) -> f64 {
+    fn evidence(&self, windows: &[Segment], theta: &DVector<f64>) -> f64 {
         let Some((normal, _)) = self.step(windows, theta) else {
             return f64::NEG_INFINITY;
         };
@@ -73,11 +73,11 @@ impl GreyBox<'_> {
         -0.5 * self.cost(windows, theta) - volume
     }
 
-    /// The parameters that explain the windows best, and the relative error of the model that is left.
-    fn improve(&mut self, windows: &[Window], model_error: f64) -> (DVector<f64>, f64) {
-        let (mut theta, mut left) = (self.design.clone(), model_error);
+    /// The parameters that explain the windows best, and the relative error of the model that remains.
+    fn improve(&mut self, windows: &[Segment], model_error: f64) -> (DVector<f64>, f64) {
+        let (mut theta, mut remaining) = (self.design.clone(), model_error);
         for _ in 0..ITERATIONS {
-            self.deviation = self.unexplained(windows, &theta);
+            self.deviation = self.residual_deviation(windows, &theta);
             let Some((normal, step)) = self.step(windows, &theta) else {
                 break;
             };
@@ -90,26 +90,27 @@ impl GreyBox<'_> {
                 break;
             };
             theta = better;
-            left = model_error * self.left(&normal, &theta).unwrap_or(1.0).sqrt();
+            let variance = self.remaining_variance(&normal, &theta).unwrap_or(1.0);
+            remaining = model_error * variance.sqrt();
             if before - cost <= CONVERGED * before {
                 break;
             }
         }
-        (theta, left)
+        (theta, remaining)
     }
 
     /// The mode in which the inputs act a sample later than their rows say: neither the model nor what is fitted
     /// explains the `windows` nearly as well as the same does those where they do (`late`).
     pub(super) fn late(
         &mut self,
-        windows: &[Window],
-        late: &[Window],
+        windows: &[Segment],
+        late: &[Segment],
         theta: &DVector<f64>,
         model_error: f64,
     ) -> Option<usize> {
         let suspect = |grey: &Self, [one, other]: [&DVector<f64>; 2]| {
-            let found = grey.unexplained(windows, one);
-            let later = grey.unexplained(late, other);
+            let found = grey.residual_deviation(windows, one);
+            let later = grey.residual_deviation(late, other);
             let mut modes = found.iter().zip(&later);
             modes.position(|(found, later)| {
                 let ratio = later.component_div(found);
@@ -122,44 +123,44 @@ impl GreyBox<'_> {
         suspect(self, [theta, &of_late])
     }
 
-    /// Sum of squares of what is left, in units of the deviations.
-    pub(super) fn rests(&self, windows: &[Window], theta: &DVector<f64>) -> f64 {
+    /// Sum of squares of the residuals, in units of the deviations.
+    pub(super) fn sum_of_squares(&self, windows: &[Segment], theta: &DVector<f64>) -> f64 {
         let modes = self.matrices(theta);
-        let rest = |window| self.explain(window, &modes).rest.norm_squared();
-        windows.iter().map(rest).sum()
+        let squares = |window| self.explain(window, &modes).residual.norm_squared();
+        windows.iter().map(squares).sum()
     }
 
-    fn cost(&self, windows: &[Window], theta: &DVector<f64>) -> f64 {
+    fn cost(&self, windows: &[Segment], theta: &DVector<f64>) -> f64 {
         let moved = (theta - &self.design).component_div(&self.prior);
-        self.rests(windows, theta) + moved.norm_squared()
+        self.sum_of_squares(windows, theta) + moved.norm_squared()
     }
 
     /// The data's normal matrix, and the step of Gauss and Newton.
     pub(super) fn step(
         &self,
-        windows: &[Window],
+        windows: &[Segment],
         theta: &DVector<f64>,
     ) -> Option<(DMatrix<f64>, DVector<f64>)> {
         let count = theta.len();
         let modes = self.matrices(theta);
         let mut normal = DMatrix::zeros(count, count);
-        let mut right = DVector::zeros(count);
+        let mut gradient = DVector::zeros(count);
         for window in windows {
             let found = self.explain(window, &modes);
-            let slope = self.slope(window, &modes, &found);
-            normal += slope.tr_mul(&slope);
-            right += slope.tr_mul(&found.rest);
+            let sensitivity = self.sensitivity(window, &modes, &found);
+            normal += sensitivity.tr_mul(&sensitivity);
+            gradient += sensitivity.tr_mul(&found.residual);
         }
         let weight = self.prior.map(|size| (size * size).recip());
-        right -= weight.component_mul(&(theta - &self.design));
+        gradient -= weight.component_mul(&(theta - &self.design));
         let whole = &normal + DMatrix::from_diagonal(&weight);
-        let step = whole.cholesky()?.solve(&right);
+        let step = whole.cholesky()?.solve(&gradient);
         Some((normal, step))
     }
 
     /// Share of the variance that the error of the model has in readings of the usual movement and that is left
     /// after windows with the `normal` matrix: what the log hardly moved is as uncertain as before.
-    pub(super) fn left(&self, normal: &DMatrix<f64>, theta: &DVector<f64>) -> Option<f64> {
+    fn remaining_variance(&self, normal: &DMatrix<f64>, theta: &DVector<f64>) -> Option<f64> {
         let prior = self.prior.map(|size| size * size);
         let (usual, _) = self.step(&self.usual, theta)?;
         let before = usual.diagonal().dot(&prior);

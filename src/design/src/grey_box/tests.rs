@@ -27,7 +27,7 @@ fn scaling() -> Scaling {
 }
 
 /// What a step response of the matrices differs by from the plant's, relative to the model's difference.
-fn left(fitted: &FittedMode, plant: &Mode, model: &Mode) -> f64 {
+fn relative_error(fitted: &FittedMode, plant: &Mode, model: &Mode) -> f64 {
     let gain = |a: &DMatrix<f64>, b: &DMatrix<f64>, c: &DMatrix<f64>| {
         let still = DMatrix::identity(2, 2) - a;
         (c * still.lu().solve(b).unwrap())[(0, 0)]
@@ -62,7 +62,10 @@ fn a_log_corrects_the_model() {
     let (plant, model) = (mode(), wrong(&mode()));
     let log = commission(&plant, &[1.0], &[0.01], 1200, 4);
     let found = fit_one(&model, log, None, 0.1).unwrap();
-    assert!(left(&found.mode, &plant, &model) < 0.05, "{found:?}");
+    assert!(
+        relative_error(&found.mode, &plant, &model) < 0.05,
+        "{found:?}"
+    );
     assert!(found.mode.fit[0] > found.mode.fit_of_model[0]);
     assert!((found.deviation[0] - 0.01).abs() < 0.002, "{found:?}");
     assert!(found.model_error < 0.05);
@@ -83,7 +86,10 @@ fn a_disturbance_in_the_log_is_not_taken_for_the_plant() {
         count: 1,
     };
     let found = fit_one(&model, log, Some(known), 0.1).unwrap();
-    assert!(left(&found.mode, &plant, &model) < 0.1, "{found:?}");
+    assert!(
+        relative_error(&found.mode, &plant, &model) < 0.1,
+        "{found:?}"
+    );
 }
 
 /// Two modes with three sensors; inputs, a disturbance of known period and noise move them, with a switch every
@@ -134,10 +140,13 @@ fn switched_log(modes: &[Mode], seed: u64) -> Vec<Vec<Database>> {
     stretches
 }
 
-/// What is left of a log by such matrices, over its noise.
+/// Deviation of the residual of a log under such matrices, over its noise.
 fn judged(modes: &[Mode], log: &[Vec<Database>], known: Option<RecordedDisturbance>) -> f64 {
-    let records = records(log, known);
-    let windows: Vec<Window> = records.iter().flat_map(|record| cut(record, 75)).collect();
+    let segments = segments(log, known);
+    let windows: Vec<Segment> = segments
+        .iter()
+        .flat_map(|segment| cut(segment, 75))
+        .collect();
     let grey = GreyBox {
         modes,
         parameters: Vec::new(),
@@ -146,8 +155,8 @@ fn judged(modes: &[Mode], log: &[Vec<Database>], known: Option<RecordedDisturban
         deviation: vec![DVector::from_element(3, 0.01); 2],
         usual: Vec::new(),
     };
-    let left = grey.unexplained(&windows, &DVector::zeros(0));
-    let squares: f64 = left.iter().map(DVector::norm_squared).sum();
+    let deviations = grey.residual_deviation(&windows, &DVector::zeros(0));
+    let squares: f64 = deviations.iter().map(DVector::norm_squared).sum();
     (squares / 6.0).sqrt() / 0.01
 }
 
@@ -192,7 +201,7 @@ fn wrong_output_and_disturbance_matrices_are_corrected() {
     let fresh = switched_log(&plant, 2);
     let [of_model, of_fit, of_plant] =
         [&model[..], &fitted, &plant].map(|modes| judged(modes, &fresh, known));
-    println!("left over noise: model {of_model}, fitted {of_fit}, plant {of_plant}");
+    println!("residual over noise: model {of_model}, fitted {of_fit}, plant {of_plant}");
     assert!(of_model > 1.5 && of_fit < 1.05 && (of_plant - 1.0).abs() < 0.05);
     let mut only = fitted.clone();
     for (mode, model) in only.iter_mut().zip(&model) {

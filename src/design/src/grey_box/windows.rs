@@ -5,7 +5,7 @@ use ftc_plant::Mode;
 use ftc_plant::scaling::Scaling;
 use nalgebra::DMatrix;
 
-/// Samples in a window, at least, and per unknown of its own.
+/// Samples in a window, at least, and per nuisance parameter.
 pub(super) const WINDOW: usize = 40;
 const SAMPLES_PER_UNKNOWN: usize = 4;
 
@@ -15,9 +15,9 @@ pub(super) const HELD_BACK: usize = 4;
 /// Windows of the usual movement in each mode.
 const USUAL: usize = 4;
 
-/// Samples without a gap: what drove the plant and what was read.
+/// Samples without a gap, a log from one gap to the next or a window of it: what drove the plant and what was read.
 #[derive(Clone)]
-pub(super) struct Window {
+pub(super) struct Segment {
     /// The mode of each sample (0-based).
     pub(super) modes: Vec<usize>,
     /// Inputs about the mode's operating point (m x samples).
@@ -31,18 +31,15 @@ pub(super) struct Window {
 /// Samples in a window.
 pub(crate) fn least_samples(mode: &Mode, disturbance: Option<RecordedDisturbance>) -> usize {
     let count = disturbance.map_or(0, |known| known.count);
-    let own = mode.a.nrows() + (1 + 2 * count) * mode.e.ncols();
-    WINDOW.max(SAMPLES_PER_UNKNOWN * own / mode.c.nrows())
+    let nuisance = mode.a.nrows() + (1 + 2 * count) * mode.e.ncols();
+    WINDOW.max(SAMPLES_PER_UNKNOWN * nuisance / mode.c.nrows())
 }
 
-/// A log from one gap to the next.
-pub(super) type Record = Window;
-
 /// Stretches that follow each other without a gap, in whatever mode, joined.
-pub(super) fn records(
+pub(super) fn segments(
     stretches: &[Vec<Database>],
     disturbance: Option<RecordedDisturbance>,
-) -> Vec<Record> {
+) -> Vec<Segment> {
     let count = disturbance.map_or(0, |known| known.count);
     // The level first, then the waves.
     let wave = |k: usize, column: usize| match (disturbance, column.checked_sub(1)) {
@@ -83,7 +80,7 @@ pub(super) fn records(
         let waves = DMatrix::from_fn(modes.len(), 1 + 2 * count, |k, column| {
             wave(first + k, column)
         });
-        Record {
+        Segment {
             u: columns(|part| &part.inputs),
             y: columns(|part| &part.outputs),
             waves,
@@ -99,7 +96,7 @@ pub(super) fn usual(
     length: usize,
     disturbance: Option<RecordedDisturbance>,
     scaling: &Scaling,
-) -> Vec<Window> {
+) -> Vec<Segment> {
     let still = vec![0.0; scaling.outputs.len()];
     let run = |(seed, mode): (usize, &Mode)| {
         let samples = USUAL * length;
@@ -112,50 +109,50 @@ pub(super) fn usual(
         )]
     };
     let stretches: Vec<_> = modes.iter().enumerate().map(run).collect();
-    let records = records(&stretches, disturbance);
-    records
+    let segments = segments(&stretches, disturbance);
+    segments
         .iter()
-        .flat_map(|record| cut(record, length))
+        .flat_map(|segment| cut(segment, length))
         .collect()
 }
 
 /// The same if each input acted one sample after its row.
-pub(super) fn a_sample_later(record: &Record) -> Record {
-    let samples = record.modes.len().saturating_sub(1);
-    let from = record.modes.len() - samples;
-    Record {
-        modes: record.modes[from..].to_vec(),
-        u: record.u.columns(0, samples).into_owned(),
-        y: record.y.columns(from, samples).into_owned(),
-        waves: record.waves.rows(from, samples).into_owned(),
+pub(super) fn a_sample_later(segment: &Segment) -> Segment {
+    let samples = segment.modes.len().saturating_sub(1);
+    let from = segment.modes.len() - samples;
+    Segment {
+        modes: segment.modes[from..].to_vec(),
+        u: segment.u.columns(0, samples).into_owned(),
+        y: segment.y.columns(from, samples).into_owned(),
+        waves: segment.waves.rows(from, samples).into_owned(),
     }
 }
 
 /// Windows of so many samples, one after the other.
-pub(super) fn cut(record: &Record, length: usize) -> Vec<Window> {
-    let starts = (0..record.modes.len() / length).map(|at| at * length);
-    let window = |from: usize| Window {
-        modes: record.modes[from..from + length].to_vec(),
-        u: record.u.columns(from, length).into_owned(),
-        y: record.y.columns(from, length).into_owned(),
-        waves: record.waves.rows(from, length).into_owned(),
+pub(super) fn cut(segment: &Segment, length: usize) -> Vec<Segment> {
+    let starts = (0..segment.modes.len() / length).map(|at| at * length);
+    let window = |from: usize| Segment {
+        modes: segment.modes[from..from + length].to_vec(),
+        u: segment.u.columns(from, length).into_owned(),
+        y: segment.y.columns(from, length).into_owned(),
+        waves: segment.waves.rows(from, length).into_owned(),
     };
     starts.map(window).collect()
 }
 
-pub(super) fn samples_of(windows: &[Window], mode: usize) -> usize {
-    let count = |window: &Window| window.modes.iter().filter(|&&of| of == mode).count();
+pub(super) fn samples_of(windows: &[Segment], mode: usize) -> usize {
+    let count = |window: &Segment| window.modes.iter().filter(|&&of| of == mode).count();
     windows.iter().map(count).sum()
 }
 
 /// Windows to learn from, and windows to judge by: a share of what each mode has.
-pub(super) fn split(windows: Vec<Window>, modes: usize) -> (Vec<Window>, Vec<Window>) {
+pub(super) fn split(windows: Vec<Segment>, modes: usize) -> (Vec<Segment>, Vec<Segment>) {
     let (mut learn, mut held_back) = (Vec::new(), Vec::new());
     for window in windows {
         let due = |mode: usize| {
-            let own = samples_of(std::slice::from_ref(&window), mode);
-            let held = samples_of(&held_back, mode) + own;
-            own > 0 && HELD_BACK * held <= samples_of(&learn, mode) + held
+            let here = samples_of(std::slice::from_ref(&window), mode);
+            let held = samples_of(&held_back, mode) + here;
+            here > 0 && HELD_BACK * held <= samples_of(&learn, mode) + held
         };
         match (0..modes).any(due) {
             true => held_back.push(window),

@@ -108,6 +108,33 @@ pub struct ModeModel {
     pub outputs: Sparse<2>,
 }
 
+/// Of everything at once, of each input, of each wave, and of the states.
+fn jumps(layout: Layout, c: &[f64], g: &[f64], load_size: &[f64]) -> Vec<Jump> {
+    let Layout { n, m, p, .. } = layout;
+    let count = layout.loads();
+    let jump = |(loads, gains): (Range<usize>, Range<usize>)| {
+        let mut effect = vec![0.0; p * loads.len()];
+        for (row, c) in effect
+            .chunks_exact_mut(loads.len().max(1))
+            .zip(c.chunks_exact(n))
+        {
+            for (value, k) in row.iter_mut().zip(loads.clone()) {
+                let column = g.iter().skip(k).step_by(count);
+                *value = load_size[k] * c.iter().zip(column).map(|(c, g)| c * g).sum::<f64>();
+            }
+        }
+        let mut seen = vec![0.0; p * p];
+        multiply_transposed(&mut seen, &effect, &effect, loads.len());
+        Jump { loads, gains, seen }
+    };
+    let each = (0..m).map(|j| (j..j + 1, j..j + 1));
+    let waves = (m..layout.state_load()).map(|j| (j..j + 1, 0..0));
+    let states = core::iter::once((layout.state_load()..count, 0..0));
+    let every = core::iter::once((0..count, 0..m));
+    let all = every.chain(each).chain(waves).chain(states);
+    all.map(jump).collect()
+}
+
 impl ModeModel {
     /// Fills in what follows from the matrices and the load's covariance.
     #[allow(clippy::too_many_arguments)]
@@ -143,32 +170,7 @@ impl ModeModel {
                 *value -= c[i * n + j] * x0[j];
             }
         }
-        let count = layout.loads();
-        let jump = |(loads, gains): (Range<usize>, Range<usize>)| {
-            let mut effect = vec![0.0; p * loads.len()];
-            for (row, c) in effect
-                .chunks_exact_mut(loads.len().max(1))
-                .zip(c.chunks_exact(n))
-            {
-                for (value, k) in row.iter_mut().zip(loads.clone()) {
-                    let column = g.iter().skip(k).step_by(count);
-                    *value = load_size[k] * c.iter().zip(column).map(|(c, g)| c * g).sum::<f64>();
-                }
-            }
-            let mut seen = vec![0.0; p * p];
-            multiply_transposed(&mut seen, &effect, &effect, loads.len());
-            Jump { loads, gains, seen }
-        };
-        let each = (0..m).map(|j| (j..j + 1, j..j + 1));
-        let waves = (m..layout.state_load()).map(|j| (j..j + 1, 0..0));
-        let states = core::iter::once((layout.state_load()..count, 0..0));
-        let every = core::iter::once((0..count, 0..m));
-        let jumps = every
-            .chain(each)
-            .chain(waves)
-            .chain(states)
-            .map(jump)
-            .collect();
+        let jumps = jumps(layout, &c, &g, &load_size);
         let mut cb = vec![0.0; p * m];
         multiply(&mut cb, &c, &b, n);
         Self {

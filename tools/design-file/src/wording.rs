@@ -1,0 +1,543 @@
+//! The library's verdicts in the words of a design file: what to change is named by its key.
+//!
+//! Sentences in which nothing of a design file is named are the library's own.
+
+use ftc_design::commissioning::{CommissioningError, LONGEST_RESPONSE};
+use ftc_design::work::{MOST_BYTES, TooLarge};
+use ftc_design::{
+    Advice, DecayRate, DesignError, Infeasibility, Lyapunov, RequestError, SolverFailure,
+    SpecError, Uncertified, Uncontrollable, Weight,
+};
+use ftc_plant::PlantError;
+use ftc_plant::rectifier::RectifierError;
+use nalgebra::Complex;
+
+/// Why there is no design, and which keys to change.
+///
+/// ```
+/// use design_file::wording;
+/// use ftc_design::{Advice, Lyapunov};
+///
+/// let advice = Advice::LyapunovAndDecay(Lyapunov::Dwell, 0.98);
+/// let said = wording::of_advice(&advice);
+/// assert!(said.ends_with("controller.lyapunov = \"dwell\", controller.decay = 0.98"));
+/// ```
+pub fn of_error(error: &DesignError) -> String {
+    match error {
+        DesignError::Request(error) => of_request(error),
+        DesignError::Infeasible(error) => of_infeasibility(error),
+        DesignError::Uncertified(error) => of_uncertified(error),
+        DesignError::Solver(error) => match solver_remedy(*error) {
+            Some(remedy) => format!("the solver gave no solution: {remedy}"),
+            None => DesignError::Solver(*error).to_string(),
+        },
+        other => other.to_string(),
+    }
+}
+
+/// A change that works, as keys with their values.
+pub fn of_advice(advice: &Advice) -> String {
+    match advice {
+        Advice::Decay(decay) => format!("a slower decay is feasible: controller.decay = {decay}"),
+        Advice::Lyapunov(kind) => {
+            format!("another guarantee is feasible: controller.lyapunov = \"{kind}\"")
+        }
+        Advice::LyapunovAndDecay(kind, decay) => format!(
+            "another guarantee with a slower decay is feasible: controller.lyapunov = \"{kind}\", \
+             controller.decay = {decay}"
+        ),
+        Advice::Tracked(outputs) => {
+            let numbers: Vec<String> = outputs.iter().map(|o| (o + 1).to_string()).collect();
+            format!(
+                "tracking fewer outputs is feasible: controller.tracked = [{}]",
+                numbers.join(", ")
+            )
+        }
+        Advice::ObserverDecay(decay) => {
+            format!("a slower decay of the observer is feasible: observer.decay = {decay}")
+        }
+        // An observer has the guarantee of its controller.
+        Advice::ObserverLyapunov(kind) => format!(
+            "another guarantee is feasible for the observer: controller.lyapunov = \"{kind}\""
+        ),
+        Advice::Harmonics(0) => {
+            "integral action alone is feasible: controller.internal_model = false".into()
+        }
+        Advice::Harmonics(count) => format!(
+            "an internal model of fewer harmonics is feasible: disturbance.harmonics = {count}"
+        ),
+        other => other.to_string(),
+    }
+}
+
+/// What is wrong with a request, and which keys to change.
+pub fn of_request(error: &RequestError) -> String {
+    match error {
+        RequestError::Plant(error) => of_plant(error),
+        RequestError::Spec(error) => of_spec(error),
+        RequestError::Uncontrollable(error) => of_uncontrollable(error),
+        RequestError::TooLarge(error) => of_too_large(error),
+        RequestError::Commissioning(error) => of_commissioning(error),
+        RequestError::Database { mode, error } => {
+            format!("mode {mode}: {}", of_commissioning(error))
+        }
+        RequestError::ResponseLength {
+            length,
+            inputs,
+            most,
+        } => format!(
+            "the response length is {length} samples, but with {inputs} inputs it must lie between 1 and {most}: \
+             set estimator.response_length, or choose a longer sample_time"
+        ),
+        RequestError::OperatingInput {
+            mode,
+            input,
+            value,
+            min,
+            max,
+        } => format!(
+            "mode {mode}: operating_point.u has {value} at input {input}, which signals.inputs[{input}] limits to {}: give \
+             a point within the limits, or other limits",
+            interval(*min, *max)
+        ),
+        RequestError::Bumpless => {
+            "controller.bumpless = true cannot be proved for this design: set it to false, set another \
+             controller.decay, or controller.lyapunov = \"dwell\""
+                .into()
+        }
+        RequestError::HiddenDisturbance {
+            mode,
+            successor,
+            seen,
+            wanted,
+        } => {
+            let entering = match mode == successor {
+                true => String::new(),
+                false => format!(" when mode {successor} follows"),
+            };
+            format!(
+                "no unknown input observer exists for mode {mode}{entering}: rank(C E) = {seen}, but rank(E) = {wanted}, \
+                 so part of the disturbance does not show in the outputs at once: set observer.kind = \"luenberger\" or \
+                 \"auto\", or use more sensors"
+            )
+        }
+        RequestError::NoDisturbance => {
+            "observer.kind = \"uio\" needs a disturbance on the state (E), but there is none: set it to \
+             \"luenberger\" or \"auto\""
+                .into()
+        }
+        RequestError::Undetectable {
+            mode,
+            decay,
+            magnitude,
+            decoupled,
+        } => of_undetectable(*mode, *decay, *magnitude, *decoupled),
+        other => other.to_string(),
+    }
+}
+
+/// What is wrong with a plant.
+pub(crate) fn of_plant(error: &PlantError) -> String {
+    match error {
+        PlantError::SampleTime(given) => {
+            format!("sample_time is {given}: give a positive number of seconds")
+        }
+        PlantError::OperatingPointLength {
+            mode,
+            part,
+            found,
+            needed,
+        } => format!(
+            "mode {mode}: operating_point.{part} has {found} entries: give the {needed} that the plant needs"
+        ),
+        PlantError::OperatingPointNotFinite { mode, part } => {
+            format!("mode {mode}: operating_point.{part} is not finite: give numbers")
+        }
+        other => other.to_string(),
+    }
+}
+
+/// Why a rectifier has no operating point.
+pub(crate) fn of_rectifier(error: &RectifierError) -> String {
+    match error {
+        RectifierError::DcVoltage { given, diodes } => format!(
+            "plant.dc_voltage is {given} V, but the diodes hold the link at sqrt(3) times plant.phase_voltage, \
+             {diodes:.1} V: give a dc_voltage above it"
+        ),
+        RectifierError::Overload {
+            mode,
+            power,
+            resistance,
+        } => format!(
+            "plant.loads[{mode}] is too small: in mode {mode} the grid cannot supply {power:.0} W through plant.resistance = \
+             {resistance} ohm: raise the load resistance"
+        ),
+        other => format!("plant: {other}"),
+    }
+}
+
+fn of_infeasibility(error: &Infeasibility) -> String {
+    let help = match error.advice.is_empty() {
+        true => "none of the usual changes (controller.decay nearer to 1, controller.lyapunov = \"dwell\", fewer \
+                 outputs in controller.tracked) helps"
+            .into(),
+        false => all(&error.advice),
+    };
+    format!("{}; {help}", error.conflict())
+}
+
+fn of_uncertified(error: &Uncertified) -> String {
+    let help = match error.advice.is_empty() {
+        true => "give nominal values in [signals], or set another controller.decay".into(),
+        false => all(&error.advice),
+    };
+    format!(
+        "the design could not be certified: {}; {help}",
+        error.reason
+    )
+}
+
+fn all(advice: &[Advice]) -> String {
+    let advice: Vec<String> = advice.iter().map(of_advice).collect();
+    advice.join("; ")
+}
+
+fn solver_remedy(error: SolverFailure) -> Option<&'static str> {
+    Some(match error {
+        SolverFailure::Unbounded => {
+            "it found the objective unbounded: give every input a weight above 0 in controller.input_weight"
+        }
+        SolverFailure::TooManyIterations => {
+            "it did not finish within its iteration limit: give nominal values in [signals]"
+        }
+        SolverFailure::NumericalTrouble => {
+            "its numbers broke down: give nominal values in [signals]"
+        }
+        _ => return None,
+    })
+}
+
+fn of_spec(error: &SpecError) -> String {
+    match error {
+        SpecError::NothingTracked => "controller.tracked is empty: name at least one output".into(),
+        SpecError::TooFewInputs { tracked, inputs } => format!(
+            "controller.tracked names {tracked} outputs, but the plant has {inputs} inputs: track at most as many \
+             outputs as there are inputs"
+        ),
+        SpecError::UnknownOutput { output, outputs } => format!(
+            "controller.tracked names output {output}, but the plant has {outputs}: name one that it has"
+        ),
+        SpecError::TrackedTwice(output) => {
+            format!("controller.tracked names output {output} twice: name each output once")
+        }
+        SpecError::Latency(latency) => format!("controller.latency is {latency}: give 0 or 1"),
+        SpecError::Decay { of, decay } => {
+            format!(
+                "{} is {decay}: give a number above 0 and at most 1",
+                decay_key(*of)
+            )
+        }
+        SpecError::NoDwellTime(of) => format!(
+            "{} = 1 gives no finite dwell time: give a number below 1",
+            decay_key(*of)
+        ),
+        SpecError::Harmonic {
+            harmonic,
+            samples,
+            shortest,
+            longest,
+        } => {
+            let fewer = match harmonic - 1 {
+                0 => String::new(),
+                count => format!(", set disturbance.harmonics = {count}"),
+            };
+            format!(
+                "the internal model cannot hold harmonic {harmonic} of the disturbance, whose period is {samples:.6} \
+                 samples: choose a sample_time at which it lies between {shortest:.4} and {longest:.0} samples{fewer}, or \
+                 set controller.internal_model = false"
+            )
+        }
+        SpecError::WeightCount {
+            weight,
+            found,
+            needed,
+        } => format!(
+            "{} has {found} entries: give one number, or a list of {needed}",
+            weight_key(*weight)
+        ),
+        SpecError::Weight(weight) => {
+            format!(
+                "{} must be finite and not negative: give 0 or a positive number",
+                weight_key(*weight)
+            )
+        }
+        other => other.to_string(),
+    }
+}
+
+fn decay_key(of: DecayRate) -> &'static str {
+    match of {
+        DecayRate::Observer => "observer.decay",
+        _ => "controller.decay",
+    }
+}
+
+/// The key of a weight.
+pub fn weight_key(weight: Weight) -> &'static str {
+    match weight {
+        Weight::Output => "controller.output_weight",
+        Weight::Integral => "controller.integral_weight",
+        _ => "controller.input_weight",
+    }
+}
+
+fn of_uncontrollable(error: &Uncontrollable) -> String {
+    match error {
+        Uncontrollable::Eigenvalue {
+            mode,
+            eigenvalue,
+            decay,
+        } => {
+            let magnitude = eigenvalue.norm();
+            let slower = match rounded_up(magnitude) {
+                above if above < 1.0 => format!(", or set controller.decay above {above:.4}"),
+                _ => String::new(),
+            };
+            format!(
+                "mode {mode}: (A, B) is uncontrollable: no input moves its eigenvalue {} of magnitude {magnitude:.4}, \
+                 which decays more slowly than controller.decay = {decay}: add an input{slower}",
+                complex(*eigenvalue)
+            )
+        }
+        Uncontrollable::Tracked { mode } => format!(
+            "mode {mode}: (A, B) cannot hold the tracked outputs at arbitrary values, the pair with integral action is \
+             uncontrollable: track fewer outputs in controller.tracked, or outputs on which the inputs act independently"
+        ),
+        Uncontrollable::Harmonic { mode, harmonic } => format!(
+            "mode {mode}: the inputs cannot move the tracked outputs at harmonic {harmonic} of the disturbance, so no \
+             internal model can reject it: set fewer disturbance.harmonics, track fewer outputs in controller.tracked, or \
+             set controller.internal_model = false"
+        ),
+        other => other.to_string(),
+    }
+}
+
+fn of_too_large(error: &TooLarge) -> String {
+    let one_at_a_time = match error.lyapunov {
+        Lyapunov::Dwell => "",
+        Lyapunov::Common | Lyapunov::Switched => {
+            ", or set controller.lyapunov = \"dwell\", which solves one mode at a time"
+        }
+    };
+    format!(
+        "the inequalities of this design would take about {:.0} GB of memory and {}, but at most {:.0} GB are taken: \
+         reduce the number of states, inputs or modes{one_at_a_time}",
+        error.work.bytes / 1e9,
+        error.work.time(),
+        MOST_BYTES / 1e9
+    )
+}
+
+fn of_commissioning(error: &CommissioningError) -> String {
+    match error {
+        CommissioningError::Unstable { mode, radius } => format!(
+            "mode {mode}: A has spectral radius {radius:.4}, but the estimator needs a stable mode (below 1): set \
+             estimator.method = \"observer\""
+        ),
+        CommissioningError::SlowResponse { mode, radius } => format!(
+            "mode {mode}: the response is still felt after {LONGEST_RESPONSE} samples (spectral radius {radius:.6}): set \
+             estimator.method = \"observer\", or choose a longer sample_time for this loop"
+        ),
+        other => other.to_string(),
+    }
+}
+
+fn of_undetectable(mode: usize, decay: f64, magnitude: f64, decoupled: bool) -> String {
+    let (which, whose) = match decoupled {
+        true => ("observer of this kind", "(C, T A)"),
+        false => ("observer", "A"),
+    };
+    let help = match (rounded_up(magnitude), decoupled) {
+        (above, _) if above < 1.0 => format!("set observer.decay above {above:.4}"),
+        (_, true) => "set observer.kind = \"auto\", or use more sensors".into(),
+        (_, false) => {
+            "no observer of any kind moves it: add a sensor that shows it, or take what grows out of the model if the \
+             plant does not have it"
+                .into()
+        }
+    };
+    format!(
+        "no {which} reaches observer.decay = {decay} in mode {mode}: {whose} has an eigenvalue of magnitude \
+         {magnitude:.4} that the outputs do not show; {help}"
+    )
+}
+
+fn interval(min: Option<f64>, max: Option<f64>) -> String {
+    match (min, max) {
+        (Some(min), Some(max)) => format!("{min} to {max}"),
+        (Some(min), None) => format!("{min} or more"),
+        (None, Some(max)) => format!("{max} or less"),
+        (None, None) => "any value".into(),
+    }
+}
+
+/// To as many digits as are shown.
+fn rounded_up(magnitude: f64) -> f64 {
+    (magnitude * 1e4).ceil() / 1e4
+}
+
+fn complex(value: Complex<f64>) -> String {
+    match value.im == 0.0 {
+        true => format!("{:.4}", value.re),
+        false => format!("{:.4}{:+.4}i", value.re, value.im),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn keys(said: &str, keys: &[&str]) {
+        for key in keys {
+            assert!(said.contains(key), "no {key} in: {said}");
+        }
+    }
+
+    #[test]
+    fn every_advice_is_a_key_with_its_value() {
+        for (advice, key) in [
+            (Advice::Decay(0.98), "controller.decay = 0.98"),
+            (
+                Advice::Lyapunov(Lyapunov::Dwell),
+                "controller.lyapunov = \"dwell\"",
+            ),
+            (Advice::Tracked(vec![0, 2]), "controller.tracked = [1, 3]"),
+            (Advice::ObserverDecay(0.9), "observer.decay = 0.9"),
+            (
+                Advice::ObserverLyapunov(Lyapunov::Switched),
+                "controller.lyapunov = \"switched\"",
+            ),
+            (Advice::Harmonics(0), "controller.internal_model = false"),
+            (Advice::Harmonics(2), "disturbance.harmonics = 2"),
+        ] {
+            keys(&of_advice(&advice), &[key]);
+        }
+    }
+
+    #[test]
+    fn what_is_wrong_with_a_request_names_the_keys_to_change() {
+        let eigenvalue = Complex::new(0.97, 0.0);
+        let errors: [(RequestError, &[&str]); 15] = [
+            (RequestError::Bumpless, &["controller.bumpless = true"]),
+            (RequestError::NoDisturbance, &["observer.kind = \"uio\""]),
+            (
+                RequestError::HiddenDisturbance {
+                    mode: 1,
+                    successor: 2,
+                    seen: 0,
+                    wanted: 1,
+                },
+                &["when mode 2 follows", "observer.kind = \"luenberger\""],
+            ),
+            (
+                RequestError::ResponseLength {
+                    length: 1500,
+                    inputs: 2,
+                    most: 1000,
+                },
+                &["estimator.response_length", "sample_time"],
+            ),
+            (
+                RequestError::Undetectable {
+                    mode: 1,
+                    decay: 0.8,
+                    magnitude: 0.95,
+                    decoupled: false,
+                },
+                &["observer.decay = 0.8", "set observer.decay above 0.95"],
+            ),
+            (
+                RequestError::Undetectable {
+                    mode: 1,
+                    decay: 0.8,
+                    magnitude: 1.5,
+                    decoupled: true,
+                },
+                &["set observer.kind = \"auto\""],
+            ),
+            (
+                Uncontrollable::Eigenvalue {
+                    mode: 1,
+                    eigenvalue,
+                    decay: 0.9,
+                }
+                .into(),
+                &[
+                    "eigenvalue 0.9700 of",
+                    "controller.decay = 0.9:",
+                    "set controller.decay above 0.97",
+                ],
+            ),
+            (
+                Uncontrollable::Tracked { mode: 2 }.into(),
+                &["controller.tracked"],
+            ),
+            (
+                Uncontrollable::Harmonic {
+                    mode: 2,
+                    harmonic: 1,
+                }
+                .into(),
+                &["disturbance.harmonics", "controller.internal_model = false"],
+            ),
+            (
+                CommissioningError::Unstable {
+                    mode: 1,
+                    radius: 1.1,
+                }
+                .into(),
+                &["estimator.method = \"observer\""],
+            ),
+            (
+                RequestError::Database {
+                    mode: 1,
+                    error: CommissioningError::NoExcitation,
+                },
+                &["mode 1: the database excites nothing"],
+            ),
+            (
+                SpecError::Decay {
+                    of: DecayRate::Observer,
+                    decay: 2.0,
+                }
+                .into(),
+                &["observer.decay is 2"],
+            ),
+            (
+                SpecError::NoDwellTime(DecayRate::Feedback).into(),
+                &["controller.decay = 1"],
+            ),
+            (
+                SpecError::Weight(Weight::Integral).into(),
+                &["controller.integral_weight"],
+            ),
+            (
+                SpecError::Harmonic {
+                    harmonic: 3,
+                    samples: 1.5,
+                    shortest: 2.0,
+                    longest: 6283.0,
+                }
+                .into(),
+                &[
+                    "sample_time",
+                    "disturbance.harmonics = 2",
+                    "controller.internal_model = false",
+                ],
+            ),
+        ];
+        for (error, named) in errors {
+            keys(&of_error(&error.into()), named);
+        }
+    }
+}
