@@ -3,14 +3,14 @@
 //! two-state, two-mode design with a common Lyapunov function in the same run.
 #![allow(missing_docs)]
 
+use chacha20::ChaCha8Rng;
+use chacha20::rand_core::{Rng, SeedableRng};
 use ftc_design::{
     ControlSpec, DesignError, Lyapunov, ObserverChoice, ObserverSpec, SolverFailure, synthesise,
 };
 use ftc_plant::scaling::Scaling;
 use ftc_plant::{Mode, SwitchedPlant, spectral_radius};
 use nalgebra::DMatrix;
-use rand_chacha::ChaCha8Rng;
-use rand_chacha::rand_core::{Rng, SeedableRng};
 use std::time::Instant;
 
 /// Designs up to this many states are timed on three plants, larger ones on one.

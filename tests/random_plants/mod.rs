@@ -1,6 +1,8 @@
 //! Random switched plants with certified designs, for benches and property tests.
 #![allow(dead_code, missing_docs)]
 
+use chacha20::ChaCha8Rng;
+use chacha20::rand_core::{Rng, SeedableRng};
 use ftc_control::parameters::EstimatorMethod;
 use ftc_design::assembly::{KnownDisturbance, Request, assemble};
 use ftc_design::{ControlSpec, Design, Lyapunov, ObserverChoice, ObserverSpec, Signals};
@@ -8,8 +10,6 @@ use ftc_plant::Scenario;
 use ftc_plant::scenario::{ModeInterval, Waveform};
 use ftc_plant::{Mode, SwitchedPlant, spectral_radius};
 use nalgebra::DMatrix;
-use rand_chacha::ChaCha8Rng;
-use rand_chacha::rand_core::{Rng, SeedableRng};
 
 /// Samples of the scenario a design comes with.
 pub const STEPS: u64 = 50_000;

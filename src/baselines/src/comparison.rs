@@ -77,7 +77,7 @@ impl Baselines {
 /// Root mean square of each disturbance (s) over the scenario.
 fn disturbance_power(plant: &PlantSimulator, controller: &Controller) -> Vec<f64> {
     let mut squares = vec![0.0; plant.initial_state().disturbance.len()];
-    visit(plant, controller, Variant::Additive, |seen| {
+    visit(plant, controller, Variant::Additive, &mut |seen| {
         for (sum, value) in squares.iter_mut().zip(&seen.plant.disturbance) {
             *sum += value.powi(2);
         }

@@ -2,10 +2,10 @@
 //!
 //! promise: identify
 
+use chacha20::ChaCha8Rng;
+use chacha20::rand_core::{Rng, SeedableRng};
 use ftc_identify::{Coordinates, Error, Identified, Log, Settings, identify};
 use nalgebra::{DMatrix, DVector};
-use rand_chacha::ChaCha8Rng;
-use rand_chacha::rand_core::{Rng, SeedableRng};
 use rand_distr::{Distribution, StandardNormal};
 
 /// A switched plant about operating points.

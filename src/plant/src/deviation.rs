@@ -2,10 +2,10 @@
 
 use crate::scenario::{FaultEvent, first_tick};
 use crate::{Mode, SwitchedPlant};
+use chacha20::ChaCha8Rng;
+use chacha20::rand_core::{Rng, SeedableRng};
 use core::fmt;
 use nalgebra::DMatrix;
-use rand_chacha::ChaCha8Rng;
-use rand_chacha::rand_core::{Rng, SeedableRng};
 use serde::{Deserialize, Serialize};
 
 /// Departures of the true plant; the default is none.

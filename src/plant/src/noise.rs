@@ -3,9 +3,9 @@
 //! Because nothing is carried from tick to tick, a plant restored to an earlier time draws the
 //! same noise again, and a saved plant state needs no generator inside.
 
+use chacha20::ChaCha8Rng;
+use chacha20::rand_core::{SeedableRng, TryRng};
 use core::convert::Infallible;
-use rand_chacha::ChaCha8Rng;
-use rand_chacha::rand_core::{SeedableRng, TryRng};
 use rand_distr::{Distribution, StandardNormal};
 use row::Row;
 

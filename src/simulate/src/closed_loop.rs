@@ -239,11 +239,11 @@ pub fn visit(
     plant: &PlantSimulator,
     controller: &Controller,
     variant: Variant,
-    mut visit: impl FnMut(&Seen<'_>),
+    visit: &mut dyn FnMut(&Seen<'_>),
 ) -> Option<u64> {
     let mut regulator = Tolerant::new(plant, controller, variant);
     let delayed = regulator.is_delayed();
-    drive(plant, &mut regulator, delayed, |state, regulator| {
+    drive(plant, &mut regulator, delayed, &mut |state, regulator| {
         visit(&Seen {
             plant: state,
             command: regulator.command(),
@@ -260,7 +260,7 @@ pub fn run_with(
     delayed: bool,
 ) -> Trajectory {
     let mut records = Vec::with_capacity(plant.scenario().steps as usize);
-    let stalled = drive(plant, regulator, delayed, |state, regulator| {
+    let stalled = drive(plant, regulator, delayed, &mut |state, regulator| {
         records.push(record(state, regulator));
     });
     Trajectory {
@@ -275,7 +275,7 @@ fn drive(
     plant: &PlantSimulator,
     regulator: &mut dyn Regulator,
     delayed: bool,
-    mut show: impl FnMut(&PlantState, &dyn Regulator),
+    show: &mut dyn FnMut(&PlantState, &dyn Regulator),
 ) -> Option<u64> {
     let mut closed = Loop::new(plant, Box::new(regulator), delayed);
     for _ in 0..plant.scenario().steps {

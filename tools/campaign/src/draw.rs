@@ -1,12 +1,12 @@
 //! What happens in one run: a pure function of the design, the options and the number of the run.
 
 use crate::Options;
+use chacha20::ChaCha8Rng;
+use chacha20::rand_core::{Rng, SeedableRng};
 use ftc_design::Design;
 use ftc_plant::scenario::{FaultEvent, FaultKind, ModeInterval, Scenario, Waveform};
 use ftc_plant::{SwitchedPlant, TruePlant};
 use nalgebra::DMatrix;
-use rand_chacha::ChaCha8Rng;
-use rand_chacha::rand_core::{Rng, SeedableRng};
 
 /// Share of a run after which the first and before which the last fault begins.
 const ONSET: [f64; 2] = [0.1, 0.8];

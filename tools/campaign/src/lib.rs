@@ -25,6 +25,7 @@ mod draw;
 pub mod files;
 mod histogram;
 pub mod page;
+mod parquet;
 mod partial;
 pub mod rows;
 mod run;

@@ -100,7 +100,7 @@ pub fn run_one(design: &Design, controller: &Controller, options: &Options, run:
     );
     let error = [Variant::Ftc, Variant::NoFtc, Variant::ToldTheFault].map(|variant| {
         let mut squares = 0.0;
-        let stalled = closed_loop::visit(&plant, controller, variant, |seen| {
+        let stalled = closed_loop::visit(&plant, controller, variant, &mut |seen| {
             squares += square_error(design, seen);
             if variant == Variant::Ftc {
                 detection.see(seen);

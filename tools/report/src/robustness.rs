@@ -127,7 +127,7 @@ fn errors(
         PlantSimulator::with_true_plant(design.plant.clone(), true_plant, design.scenario.clone());
     let tracked = &design.controller.feedback.tracked;
     let mut squares = vec![0.0; tracked.len()];
-    let stalled = visit(&plant, controller, variant, |seen| {
+    let stalled = visit(&plant, controller, variant, &mut |seen| {
         let outputs = tracked.iter().zip(&seen.plant.reference);
         for (sum, (&row, reference)) in squares.iter_mut().zip(outputs) {
             let error = seen.plant.y_true[row] - reference;
