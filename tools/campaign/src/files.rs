@@ -1,11 +1,12 @@
 //! A campaign's results in files: read, written together, and a row per run.
 
 use crate::page::{self, ReadError};
-use crate::rows::RowWriter;
+use crate::rows::{self, RowWriter};
 use crate::{Outcome, Partial};
 use ftc_design::Design;
 use output::{Replacement, Staging};
 use std::fs::File;
+use std::io;
 use std::path::{Path, PathBuf};
 
 /// Name of the result that merges.
@@ -91,8 +92,7 @@ impl RowFile {
             Ok((replacement.file()?, replacement))
         });
         let (file, replacement) = made.map_err(|error| output::Error::of_file(target, &error))?;
-        let writer =
-            RowWriter::new(file).map_err(|error| output::Error::of_file(target, &error))?;
+        let writer = RowWriter::new(file).map_err(|error| unwritten(target, error))?;
         Ok(Self {
             writer,
             replacement,
@@ -106,7 +106,7 @@ impl RowFile {
     pub fn write(&mut self, outcomes: &[Outcome]) -> Result<(), output::Error> {
         self.writer
             .write(outcomes)
-            .map_err(|error| output::Error::of_file(self.replacement.target(), &error))
+            .map_err(|error| unwritten(self.replacement.target(), error))
     }
 
     /// Ends the file and puts it in its place.
@@ -117,9 +117,21 @@ impl RowFile {
         let target = self.replacement.target().to_path_buf();
         self.writer
             .finish()
-            .map_err(|error| output::Error::of_file(&target, &error))?;
+            .map_err(|error| unwritten(&target, error))?;
         self.replacement
             .keep()
             .map_err(|error| output::Error::of_file(&target, &error))
     }
+}
+
+/// What the file system said, where the Parquet writer passes it on.
+fn unwritten(path: &Path, error: rows::Error) -> output::Error {
+    let error = match error {
+        rows::Error::External(error) => match error.downcast::<io::Error>() {
+            Ok(error) => *error,
+            Err(error) => io::Error::other(error),
+        },
+        error => io::Error::other(error),
+    };
+    output::Error::of_file(path, &error)
 }

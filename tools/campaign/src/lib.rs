@@ -25,7 +25,6 @@ mod draw;
 pub mod files;
 mod histogram;
 pub mod page;
-mod parquet;
 mod partial;
 pub mod rows;
 mod run;

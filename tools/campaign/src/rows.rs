@@ -1,60 +1,109 @@
 //! One row per run, as a Parquet file.
 
 use crate::Outcome;
-use crate::parquet::{Kind, Values, Writer};
-use std::io::{self, Write};
+use parquet::basic::{Compression, Repetition, Type as Physical};
+use parquet::data_type::{ByteArray, ByteArrayType, DoubleType, Int64Type};
+pub use parquet::errors::ParquetError as Error;
+use parquet::errors::ParquetError;
+use parquet::file::properties::WriterProperties;
+use parquet::file::writer::SerializedFileWriter;
+use parquet::schema::types::Type;
+use std::io::Write;
+use std::sync::Arc;
 
 /// Columns in their order.
-const COLUMNS: [(&str, Kind); 12] = [
-    ("run", Kind::Whole),
-    ("error", Kind::Real),
-    ("error_without", Kind::Real),
-    ("error_told", Kind::Real),
-    ("faults", Kind::Whole),
-    ("detected", Kind::Whole),
-    ("false_alarms", Kind::Whole),
-    ("switches", Kind::Whole),
-    ("model_error", Kind::Real),
-    ("noise", Kind::Real),
-    ("kinds", Kind::Text),
-    ("events", Kind::Text),
+const COLUMNS: [(&str, Physical); 12] = [
+    ("run", Physical::INT64),
+    ("error", Physical::DOUBLE),
+    ("error_without", Physical::DOUBLE),
+    ("error_told", Physical::DOUBLE),
+    ("faults", Physical::INT64),
+    ("detected", Physical::INT64),
+    ("false_alarms", Physical::INT64),
+    ("switches", Physical::INT64),
+    ("model_error", Physical::DOUBLE),
+    ("noise", Physical::DOUBLE),
+    ("kinds", Physical::BYTE_ARRAY),
+    ("events", Physical::BYTE_ARRAY),
 ];
 
 /// Writes the outcomes of runs, batch by batch.
-pub struct RowWriter<W: Write>(Writer<W>);
+pub struct RowWriter<W: Write + Send>(SerializedFileWriter<W>);
 
-impl<W: Write> RowWriter<W> {
+impl<W: Write + Send> RowWriter<W> {
     /// Begins a file.
     ///
     /// # Errors
     /// What the file says.
-    pub fn new(file: W) -> io::Result<Self> {
-        Writer::new(file, &COLUMNS).map(Self)
+    pub fn new(file: W) -> Result<Self, ParquetError> {
+        let fields: Result<Vec<Arc<Type>>, ParquetError> = COLUMNS
+            .iter()
+            .map(|&(name, kind)| {
+                let text = kind == Physical::BYTE_ARRAY;
+                let logical = text.then_some(parquet::basic::LogicalType::String);
+                Type::primitive_type_builder(name, kind)
+                    .with_repetition(Repetition::REQUIRED)
+                    .with_logical_type(logical)
+                    .build()
+                    .map(Arc::new)
+            })
+            .collect();
+        let schema = Type::group_type_builder("run")
+            .with_fields(fields?)
+            .build()?;
+        let properties = WriterProperties::builder()
+            .set_compression(Compression::UNCOMPRESSED)
+            .build();
+        SerializedFileWriter::new(file, Arc::new(schema), Arc::new(properties)).map(Self)
     }
 
     /// Appends a row for each outcome; `events` as JSON.
     ///
     /// # Errors
     /// What the file says.
-    pub fn write(&mut self, outcomes: &[Outcome]) -> io::Result<()> {
+    pub fn write(&mut self, outcomes: &[Outcome]) -> Result<(), ParquetError> {
         if outcomes.is_empty() {
             return Ok(());
         }
-        let rows = || outcomes.iter();
-        self.0.write(&COLUMNS.map(|(name, kind)| match kind {
-            Kind::Whole => Values::whole(rows().map(|row| whole(row, name))),
-            Kind::Real => Values::real(rows().map(|row| real(row, name))),
-            Kind::Text => Values::text(rows().map(|row| text(row, name))),
-        }))
+        let mut group = self.0.next_row_group()?;
+        for (name, kind) in COLUMNS {
+            let Some(mut column) = group.next_column()? else {
+                break;
+            };
+            match kind {
+                Physical::INT64 => {
+                    let values: Vec<i64> = outcomes.iter().map(|row| whole(row, name)).collect();
+                    column
+                        .typed::<Int64Type>()
+                        .write_batch(&values, None, None)?;
+                }
+                Physical::DOUBLE => {
+                    let values: Vec<f64> = outcomes.iter().map(|row| real(row, name)).collect();
+                    column
+                        .typed::<DoubleType>()
+                        .write_batch(&values, None, None)?;
+                }
+                _ => {
+                    let values: Vec<ByteArray> = outcomes
+                        .iter()
+                        .map(|row| ByteArray::from(text(row, name).into_bytes()))
+                        .collect();
+                    column
+                        .typed::<ByteArrayType>()
+                        .write_batch(&values, None, None)?;
+                }
+            }
+            column.close()?;
+        }
+        group.close().map(drop)
     }
 
     /// Ends the file.
     ///
     /// # Errors
     /// What the file says.
-    pub fn finish(self) -> io::Result<()> {
-        let author = concat!("ftc-fmu version ", env!("CARGO_PKG_VERSION"));
-        self.0.finish("run", author)
+    pub fn finish(self) -> Result<(), ParquetError> {
+        self.0.close().map(drop)
     }
 }
 

@@ -5,7 +5,6 @@
 mod archive;
 mod hdf5;
 mod level5;
-mod numbers;
 
 use crate::silent::caught;
 use crate::{EntryError, Error, MatrixError, quote, read_regular};
@@ -83,7 +82,7 @@ fn parse(bytes: Vec<u8>) -> Result<Found, Error> {
     if bytes.starts_with(b"MATLAB 5.0") || bytes.get(126..128).is_some_and(is_level5_mark) {
         return level5::read(&bytes);
     }
-    if bytes.starts_with(archive::MARK) {
+    if bytes.starts_with(b"\x93NUMPY") {
         return Err(MatrixError::SingleArray.into());
     }
     Err(MatrixError::Format.into())
