@@ -302,9 +302,14 @@ fn is_lost(design: &Design, controller: &Controller, case: &Case) -> bool {
 fn cost(design: &Design, controller: &Controller, case: &Case) -> Cost {
     let variants = [Variant::Ftc, Variant::ToldTheFault, Variant::NoFtc];
     let [ftc, told, none] = variants.map(|variant| case.error(design, controller, variant));
+    // Beyond all numbers is the worst, whatever the others do.
+    let over = |other: f64| match ftc.is_finite() {
+        true => ftc / other,
+        false => f64::INFINITY,
+    };
     Cost {
-        told: ftc / told,
-        none: ftc / none,
+        told: over(told),
+        none: over(none),
     }
 }
 

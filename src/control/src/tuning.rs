@@ -229,12 +229,6 @@ impl BankTuning {
         self.quiet_beside + self.quiet_per_output * outputs as f64
     }
 
-    /// Log probability that so many sensors fail, or recover, at once over that of one: [`several`](Self::several)
-    /// for two.
-    pub(crate) fn together(&self, sensors: u32) -> f64 {
-        1.0 + (self.several - 1.0) * (f64::from(sensors) - 1.0)
-    }
-
     /// The same of [`unlikely_per_output`](Self::unlikely_per_output), at most `quiet_beside`.
     pub(crate) fn unlikely(&self, outputs: usize) -> f64 {
         let limit = self.unlikely_beside + self.unlikely_per_output * outputs as f64;
@@ -249,5 +243,11 @@ impl BankTuning {
     /// The same of [`square_of_fault_per_output`](Self::square_of_fault_per_output).
     pub(crate) fn square_of_fault(&self, outputs: usize) -> f64 {
         self.square_of_fault_beside + self.square_of_fault_per_output * outputs as f64
+    }
+
+    /// Log probability that so many sensors fail, or recover, at once over that of one: [`several`](Self::several)
+    /// for two.
+    pub(crate) fn together(&self, sensors: u32) -> f64 {
+        1.0 + (self.several - 1.0) * (f64::from(sensors) - 1.0)
     }
 }

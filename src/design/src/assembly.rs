@@ -296,7 +296,7 @@ fn estimator(request: &Request, dims: Dimensions) -> Result<Estimator, RequestEr
         let noise = logged.as_ref().unwrap_or(&request.scenario.noise);
         let noise = sensor_noise(noise, &thresholds);
         let (plant, signals) = (&request.plant, &request.signals);
-        let reach = hypotheses::reach(plant, &request.control.tracked, &request.scenario);
+        let reach = hypotheses::reach(plant, signals, &request.control.tracked, &request.scenario);
         let mut settings = spec
             .hypotheses
             .settings(plant, signals, noise, &reach, known);

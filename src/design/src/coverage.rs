@@ -314,7 +314,7 @@ fn hypotheses_fit(design: &Design) -> bool {
     });
     let noise = derived::sensor_noise(&design.scenario.noise, &estimator.thresholds);
     let tracked = &design.controller.feedback.tracked;
-    let reach = hypotheses::reach(plant, tracked, &design.scenario);
+    let reach = hypotheses::reach(plant, &design.signals, tracked, &design.scenario);
     let mut derived = spec.settings(plant, &design.signals, noise, &reach, known.as_ref());
     // What a reference moves at rest comes of a factorisation, which another machine rounds otherwise.
     let mut sizes = found.fault_size.iter().zip(&derived.fault_size);

@@ -1,5 +1,6 @@
 //! Sizes and rates for the state-based estimator, from the plant and its signals.
 
+use crate::augmented::scaled as scaled_matrix;
 use crate::harmonics::KnownDisturbance;
 use crate::steady_state::steady_state;
 use crate::{Signal, Signals};
@@ -22,7 +23,7 @@ pub struct HypothesesSpec {
     pub ambiguous: Ambiguous,
     /// Mean length of a mode in samples, where the mode is to be found from the readings; it is told when absent.
     pub mode_length: Option<f64>,
-    /// Largest correction of each sensor (p), output units; the sensor's range when absent.
+    /// Largest correction of each sensor (p), output units; when absent the sensor's range, or a multiple of what is usual.
     pub authority: Option<Vec<f64>>,
     /// Size of a load on each input (m), input units; a fifth of the nominal value when absent.
     pub input_load: Option<Vec<f64>>,
@@ -155,13 +156,20 @@ impl HypothesesSpec {
 
 /// How far the scenario's references take each output (p) from its operating points, at rest in any mode and
 /// with each reference at its furthest; 0 where none moves it.
-pub(crate) fn reach(plant: &SwitchedPlant, tracked: &[usize], scenario: &Scenario) -> Vec<f64> {
+pub(crate) fn reach(
+    plant: &SwitchedPlant,
+    signals: &Signals,
+    tracked: &[usize],
+    scenario: &Scenario,
+) -> Vec<f64> {
+    // Per unit: with more inputs than references the state at rest is the least one, in no one's units.
+    let unit = signals.scaling();
     let mut reach = vec![0.0f64; plant.dimensions().outputs];
     for mode in &plant.modes {
         let furthest = |(&output, signal): (&usize, &Waveform)| {
             let [low, high] = signal.range(scenario.steps, plant.sample_time);
             let point = mode.operating_point.y[output];
-            let far = (high - point).max(point - low);
+            let far = (high - point).max(point - low) / unit.outputs[output];
             if far.is_finite() { far } else { 0.0 }
         };
         let far: Vec<f64> = tracked
@@ -169,7 +177,12 @@ pub(crate) fn reach(plant: &SwitchedPlant, tracked: &[usize], scenario: &Scenari
             .zip(&scenario.reference)
             .map(furthest)
             .collect();
-        let rests = steady_state(mode, tracked);
+        let mode = Mode::new(
+            scaled_matrix(&mode.a, &unit.states, &unit.states),
+            scaled_matrix(&mode.b, &unit.states, &unit.inputs),
+            scaled_matrix(&mode.c, &unit.outputs, &unit.states),
+        );
+        let rests = steady_state(&mode, tracked);
         let moved = &mode.c * rests.rows(0, mode.c.ncols());
         let at_rest = moved.abs() * DVector::from_column_slice(&far);
         for (reach, &at_rest) in reach.iter_mut().zip(&at_rest) {
@@ -181,6 +194,10 @@ pub(crate) fn reach(plant: &SwitchedPlant, tracked: &[usize], scenario: &Scenari
         }
     }
     reach
+        .iter()
+        .zip(&unit.outputs)
+        .map(|(far, unit)| far * unit)
+        .collect()
 }
 
 fn scaled(values: &[f64], factor: f64) -> Vec<f64> {

@@ -30,7 +30,7 @@
 //! | `observer.decay` | that of the controller |
 //! | `estimator.method`, `database` | `observer` (`reference` where `database` names logs), `commission` |
 //! | `estimator.sigmas`, `debounce`, `stuck_after`, `adapt` | 6, 1 sample, 0 (never), false |
-//! | `estimator.authority` | the sensor's range `max - min`; without one ten times its nominal value, or what the references move it by where that is more, and eight times its largest operating point |
+//! | `estimator.authority` | the sensor's range `max - min`; without one ten times the larger of its nominal value and of what the references move it by, plus eight times its largest operating point |
 //! | `estimator.input_load` | a fifth of the input's nominal value |
 //! | `estimator.model_error`, `fault_rate`, `fault_length`, `ambiguous` | 0.05, 1e-5 a sample, 1000 samples, `trust-sensors` |
 //! | `estimator.mode`, `mode_length` | `told`; 500 samples where it is `estimated` |
