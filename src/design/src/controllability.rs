@@ -2,7 +2,7 @@
 
 use super::augmented::{AugmentedMode, augment};
 use super::units::other_scaling;
-use super::{ControlSpec, Units};
+use super::{ControlSpec, Units, words};
 use ftc_plant::SwitchedPlant;
 use ftc_plant::scaling::Scaling;
 use nalgebra::{Complex, DMatrix};
@@ -18,7 +18,7 @@ pub enum Uncontrollable {
     #[error(
         "mode {mode}: (A, B) is uncontrollable: no input moves its eigenvalue {} of magnitude {:.4}, \
          which decays more slowly than the {decay} asked for: add an input or ask for a slower decay",
-        shown(*eigenvalue), eigenvalue.norm()
+        words::eigenvalue(*eigenvalue), eigenvalue.norm()
     )]
     Eigenvalue {
         /// The mode.
@@ -111,12 +111,4 @@ fn is_movable(model: &AugmentedMode, eigenvalue: Complex<f64>) -> bool {
         .copy_from(&complex(&model.b));
     let values = pencil.singular_values();
     values.min() > RANK_TOLERANCE * values.max()
-}
-
-fn shown(value: Complex<f64>) -> String {
-    if value.im == 0.0 {
-        format!("{:.4}", value.re)
-    } else {
-        format!("{:.4}{:+.4}i", value.re, value.im)
-    }
 }

@@ -61,6 +61,7 @@ mod units;
 mod verdict;
 pub mod warnings;
 pub mod weights;
+pub mod words;
 pub mod work;
 
 pub use blocks::{BlockKind, BlockName};

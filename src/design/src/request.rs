@@ -3,6 +3,7 @@
 use super::commissioning::CommissioningError;
 use super::controllability::Uncontrollable;
 use super::spec::SpecError;
+use super::words::{entering, interval, least_decay};
 use super::work::TooLarge;
 use ftc_plant::PlantError;
 
@@ -170,24 +171,8 @@ pub enum RequestError {
     NotSynthesised,
 }
 
-fn interval(min: Option<f64>, max: Option<f64>) -> String {
-    match (min, max) {
-        (Some(min), Some(max)) => format!("{min} to {max}"),
-        (Some(min), None) => format!("{min} or more"),
-        (None, Some(max)) => format!("{max} or less"),
-        (None, None) => "any value".into(),
-    }
-}
-
-fn entering(mode: usize, successor: usize) -> String {
-    match mode == successor {
-        true => String::new(),
-        false => format!(" when mode {successor} follows"),
-    }
-}
-
 fn undetectable(mode: usize, decay: f64, magnitude: f64, decoupled: bool) -> String {
-    let above = (magnitude * 1e4).ceil() / 1e4;
+    let above = least_decay(magnitude);
     let help = match (above < 1.0, decoupled) {
         (true, _) => format!("ask for a decay of the observer above {above:.4}"),
         (false, true) => "leave the choice of the observer to the design, or use more sensors".into(),

@@ -6,11 +6,10 @@ use ftc_design::commissioning::{CommissioningError, LONGEST_RESPONSE};
 use ftc_design::work::{MOST_BYTES, TooLarge};
 use ftc_design::{
     Advice, DecayRate, DesignError, Infeasibility, Lyapunov, RequestError, SolverFailure,
-    SpecError, Uncertified, Uncontrollable, Weight,
+    SpecError, Uncertified, Uncontrollable, Weight, words,
 };
 use ftc_plant::PlantError;
 use ftc_plant::rectifier::RectifierError;
-use nalgebra::Complex;
 
 /// Why there is no design, and which keys to change.
 ///
@@ -98,7 +97,7 @@ pub fn of_request(error: &RequestError) -> String {
         } => format!(
             "mode {mode}: operating_point.u has {value} at input {input}, which signals.inputs[{input}] limits to {}: give \
              a point within the limits, or other limits",
-            interval(*min, *max)
+            words::interval(*min, *max)
         ),
         RequestError::Bumpless => {
             "controller.bumpless = true cannot be proved for this design: set it to false, set another \
@@ -111,10 +110,7 @@ pub fn of_request(error: &RequestError) -> String {
             seen,
             wanted,
         } => {
-            let entering = match mode == successor {
-                true => String::new(),
-                false => format!(" when mode {successor} follows"),
-            };
+            let entering = words::entering(*mode, *successor);
             format!(
                 "no unknown input observer exists for mode {mode}{entering}: rank(C E) = {seen}, but rank(E) = {wanted}, \
                  so part of the disturbance does not show in the outputs at once: set observer.kind = \"luenberger\" or \
@@ -299,14 +295,14 @@ fn of_uncontrollable(error: &Uncontrollable) -> String {
             decay,
         } => {
             let magnitude = eigenvalue.norm();
-            let slower = match rounded_up(magnitude) {
+            let slower = match words::least_decay(magnitude) {
                 above if above < 1.0 => format!(", or set controller.decay above {above:.4}"),
                 _ => String::new(),
             };
             format!(
                 "mode {mode}: (A, B) is uncontrollable: no input moves its eigenvalue {} of magnitude {magnitude:.4}, \
                  which decays more slowly than controller.decay = {decay}: add an input{slower}",
-                complex(*eigenvalue)
+                words::eigenvalue(*eigenvalue)
             )
         }
         Uncontrollable::Tracked { mode } => format!(
@@ -357,7 +353,7 @@ fn of_undetectable(mode: usize, decay: f64, magnitude: f64, decoupled: bool) -> 
         true => ("observer of this kind", "(C, T A)"),
         false => ("observer", "A"),
     };
-    let help = match (rounded_up(magnitude), decoupled) {
+    let help = match (words::least_decay(magnitude), decoupled) {
         (above, _) if above < 1.0 => format!("set observer.decay above {above:.4}"),
         (_, true) => "set observer.kind = \"auto\", or use more sensors".into(),
         (_, false) => {
@@ -372,30 +368,10 @@ fn of_undetectable(mode: usize, decay: f64, magnitude: f64, decoupled: bool) -> 
     )
 }
 
-fn interval(min: Option<f64>, max: Option<f64>) -> String {
-    match (min, max) {
-        (Some(min), Some(max)) => format!("{min} to {max}"),
-        (Some(min), None) => format!("{min} or more"),
-        (None, Some(max)) => format!("{max} or less"),
-        (None, None) => "any value".into(),
-    }
-}
-
-/// To as many digits as are shown.
-fn rounded_up(magnitude: f64) -> f64 {
-    (magnitude * 1e4).ceil() / 1e4
-}
-
-fn complex(value: Complex<f64>) -> String {
-    match value.im == 0.0 {
-        true => format!("{:.4}", value.re),
-        false => format!("{:.4}{:+.4}i", value.re, value.im),
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
+    use nalgebra::Complex;
 
     fn keys(said: &str, keys: &[&str]) {
         for key in keys {
