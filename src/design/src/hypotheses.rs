@@ -1,11 +1,10 @@
 //! Sizes and rates for the state-based estimator, from the plant and its signals.
 
-use crate::augmented::scaled as scaled_matrix;
+use crate::augmented;
 use crate::harmonics::KnownDisturbance;
 use crate::steady_state::steady_state;
 use crate::{Signal, Signals};
 use ftc_control::parameters::{Ambiguous, Hypotheses};
-use ftc_plant::scenario::Waveform;
 use ftc_plant::{Mode, Scenario, SwitchedPlant};
 use nalgebra::DVector;
 
@@ -65,8 +64,9 @@ const DRIFT_WALK: f64 = 0.5;
 const FAULT_SIZE: [f64; 2] = [0.6, 0.5];
 /// Size of a fault relative to a known range.
 const FAULT_OF_RANGE: f64 = 0.5;
-/// Authority without a known range, relative to the nominal value and to the operating point: a limit for what no
-/// sensor shows, since a reading corrected by less than its fault may leave the loop unstable.
+/// Authority without a known range, relative to the nominal value (or what the references reach) and to the operating
+/// point. Wide, since a reading corrected by less than its fault may leave the loop unstable; finite, since so may a
+/// correction of a fault that is none.
 const AUTHORITY: [f64; 2] = [10.0, 8.0];
 /// Size of a load on an input relative to its nominal value.
 const INPUT_LOAD: f64 = 0.2;
@@ -164,40 +164,40 @@ pub(crate) fn reach(
 ) -> Vec<f64> {
     // Per unit: with more inputs than references the state at rest is the least one, in no one's units.
     let unit = signals.scaling();
-    let mut reach = vec![0.0f64; plant.dimensions().outputs];
+    let references = scenario.reference.iter();
+    let ranges: Vec<[f64; 2]> = references
+        .map(|signal| signal.range(scenario.steps, plant.sample_time))
+        .collect();
+    let mut reach = vec![0.0f64; unit.outputs.len()];
     for mode in &plant.modes {
-        let furthest = |(&output, signal): (&usize, &Waveform)| {
-            let [low, high] = signal.range(scenario.steps, plant.sample_time);
-            let point = mode.operating_point.y[output];
-            let far = (high - point).max(point - low) / unit.outputs[output];
-            if far.is_finite() { far } else { 0.0 }
-        };
-        let far: Vec<f64> = tracked
-            .iter()
-            .zip(&scenario.reference)
-            .map(furthest)
-            .collect();
+        // Nothing is asked of an output without a reference.
+        let asked = DVector::from_fn(tracked.len(), |at, _| {
+            let [low, high] = ranges.get(at).copied().unwrap_or([f64::NAN; 2]);
+            let point = mode.operating_point.y[tracked[at]];
+            finite((high - point).max(point - low) / unit.outputs[tracked[at]])
+        });
         let mode = Mode::new(
-            scaled_matrix(&mode.a, &unit.states, &unit.states),
-            scaled_matrix(&mode.b, &unit.states, &unit.inputs),
-            scaled_matrix(&mode.c, &unit.outputs, &unit.states),
+            augmented::scaled(&mode.a, &unit.states, &unit.states),
+            augmented::scaled(&mode.b, &unit.states, &unit.inputs),
+            augmented::scaled(&mode.c, &unit.outputs, &unit.states),
         );
         let rests = steady_state(&mode, tracked);
-        let moved = &mode.c * rests.rows(0, mode.c.ncols());
-        let at_rest = moved.abs() * DVector::from_column_slice(&far);
-        for (reach, &at_rest) in reach.iter_mut().zip(&at_rest) {
-            *reach = reach.max(if at_rest.is_finite() { at_rest } else { 0.0 });
+        let moved = (&mode.c * rests.rows(0, mode.c.ncols())).abs() * &asked;
+        for (reach, &moved) in reach.iter_mut().zip(&moved) {
+            *reach = reach.max(finite(moved));
         }
         // A mode that cannot rest there is asked for it all the same.
-        for (&output, &far) in tracked.iter().zip(&far) {
-            reach[output] = reach[output].max(far);
+        for (&output, &asked) in tracked.iter().zip(&asked) {
+            reach[output] = reach[output].max(asked);
         }
     }
-    reach
-        .iter()
-        .zip(&unit.outputs)
-        .map(|(far, unit)| far * unit)
-        .collect()
+    let physical = reach.iter().zip(&unit.outputs);
+    physical.map(|(reach, unit)| reach * unit).collect()
+}
+
+/// Nothing in place of what is no number.
+fn finite(value: f64) -> f64 {
+    if value.is_finite() { value } else { 0.0 }
 }
 
 fn scaled(values: &[f64], factor: f64) -> Vec<f64> {
@@ -246,4 +246,36 @@ fn unknown_disturbance(plant: &SwitchedPlant, nominal: &[f64]) -> Vec<f64> {
             if most > 0.0 { DISTURBANCE / most } else { 0.0 }
         })
         .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use ftc_plant::Dimensions;
+    use ftc_plant::scenario::Waveform;
+    use nalgebra::dmatrix;
+
+    /// Of two inputs and one reference, one input in a unit that is `size` times as small.
+    fn reach_in(size: f64) -> Vec<f64> {
+        let mode = Mode::new(
+            dmatrix![0.5, 0.1; 0.0, 0.4],
+            dmatrix![1.0, 0.5 / size; 0.2, 1.0 / size],
+            dmatrix![1.0, 0.0; 0.0, 1.0],
+        );
+        let plant = SwitchedPlant::new(1.0, vec![mode]);
+        let dims = Dimensions::check(&plant).unwrap();
+        let mut signals = Signals::numbered(dims);
+        signals.inputs[1].nominal *= size;
+        let reference = vec![Waveform::Constant { value: 2.0 }];
+        reach(&plant, &signals, &[0], &Scenario::new(10, reference, dims))
+    }
+
+    #[test]
+    fn the_unit_of_an_input_does_not_decide_how_far_references_move_an_output() {
+        let [one, other] = [1.0, 1000.0].map(reach_in);
+        assert!((one[0] - 2.0).abs() < 1e-9 && one[1] > 0.1, "{one:?}");
+        for (one, other) in one.iter().zip(&other) {
+            assert!((one - other).abs() < 1e-9, "{one} {other}");
+        }
+    }
 }
