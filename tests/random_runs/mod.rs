@@ -145,7 +145,8 @@ impl Bench {
                 if let Some(change) = change {
                     case.change(design, &mut self.random, change);
                 }
-                if change.is_some() && is_lost(design, controller, &case) {
+                let lost = |none: f64| !none.is_finite() || none > LOST;
+                if change.is_some() && lost(case.error(design, controller, Variant::NoFtc)) {
                     continue;
                 }
                 if let Some(fault) = fault {
@@ -292,11 +293,6 @@ impl Case {
         let merits = run.merits(&design.controller.feedback.tracked);
         merits.iter().map(|merit| merit.true_output.mse).sum()
     }
-}
-
-fn is_lost(design: &Design, controller: &Controller, case: &Case) -> bool {
-    let error = case.error(design, controller, Variant::NoFtc);
-    !error.is_finite() || error > LOST
 }
 
 fn cost(design: &Design, controller: &Controller, case: &Case) -> Cost {
