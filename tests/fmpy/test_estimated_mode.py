@@ -57,7 +57,7 @@ def test_the_loop_is_the_native_run(case: Case) -> None:
     [
         ({"method": "reference", "mode": "estimated"}, 'mode = "estimated" is for method = "observer" only'),
         ({"mode_length": 300}, "mode_length is given, but the mode is told"),
-        ({"mode": "estimated", "mode_length": 1}, "mode_length is 1: it must lie between 2 and"),
+        ({"mode": "estimated", "mode_length": 1}, "mode_length is 1: give a number from 2 to"),
         ({"mode": "guessed"}, "guessed"),
     ],
 )

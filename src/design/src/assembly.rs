@@ -1,6 +1,6 @@
 //! From what is asked for to a finished design: gains, observer, predictor, thresholds, record.
 
-use super::commissioning::{self, Database, LONGEST_RESPONSE, RecordedDisturbance};
+use super::commissioning::{self, Database, RecordedDisturbance};
 use super::grey_box::{self, Fit, Unusable};
 use super::harmonics;
 pub use super::harmonics::KnownDisturbance;
@@ -153,9 +153,6 @@ const MOST_REGRESSORS: usize = 20_000_000;
 
 /// Samples a sliding window holds beyond those its own inputs can explain.
 const WINDOW_MARGIN: usize = 20;
-
-/// The most response coefficients per output: beyond it a predictor is too large to ship.
-const MOST_COEFFICIENTS: usize = 2000;
 
 /// Makes the design: synthesis of gains and observer, their certificate, the fault estimator.
 ///
@@ -325,7 +322,7 @@ fn estimator(request: &Request, dims: Dimensions) -> Result<Estimator, RequestEr
 fn response_length(request: &Request, dims: Dimensions) -> Result<usize, RequestError> {
     let decayed = commissioning::response_length(&request.plant.modes)?;
     let length = request.estimator.response_length.unwrap_or(decayed);
-    let most = LONGEST_RESPONSE.min(MOST_COEFFICIENTS / dims.inputs);
+    let most = commissioning::longest_response(dims.inputs);
     if (1..=most).contains(&length) {
         Ok(length)
     } else {

@@ -57,6 +57,14 @@ const TRUNCATION: f64 = 1e-7;
 /// The longest response this estimator accepts.
 pub const LONGEST_RESPONSE: usize = 2000;
 
+/// The most response coefficients per output: beyond it a predictor is too large to ship.
+const MOST_COEFFICIENTS: usize = 2000;
+
+/// The longest response in samples that this estimator accepts of a plant with so many inputs.
+pub fn longest_response(inputs: usize) -> usize {
+    LONGEST_RESPONSE.min(MOST_COEFFICIENTS / inputs.max(1))
+}
+
 /// Why there is no response length, or no predictor.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]

@@ -8,6 +8,7 @@ use crate::derived;
 use crate::harmonics::{self, KnownDisturbance};
 use crate::hypotheses;
 use crate::observer::{check_decoupling, lost_gains_fit};
+use crate::spec::LARGEST;
 use crate::{
     CertificateError, Design, HypothesesSpec, ObserverDesign, RecordError, StateFeedback, Synthesis,
 };
@@ -24,10 +25,6 @@ use nalgebra::DMatrix;
 /// How far a number may lie from what it is derived to be, relative to the largest of its kind:
 /// rounding on another machine, and no more.
 const TOLERANCE: f64 = 1e-9;
-
-/// The largest magnitude of an operating point, a threshold or any number in a design file: no physical quantity in
-/// reasonable units is larger, and beyond it products overflow.
-pub const LARGEST: f64 = 1e15;
 
 /// Numbers of a design that `verify` holds against bounds only, in words for its report.
 pub const UNCOVERED: [&str; 7] = [

@@ -53,7 +53,7 @@ mod request;
 pub mod riccati;
 pub mod running_loop;
 mod solver;
-mod spec;
+pub mod spec;
 pub mod state_feedback;
 mod steady_state;
 mod synthesis;

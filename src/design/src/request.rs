@@ -3,7 +3,7 @@
 use super::commissioning::CommissioningError;
 use super::controllability::Uncontrollable;
 use super::spec::SpecError;
-use super::words::{entering, interval, least_decay};
+use super::words::{counted, entering, interval, least_decay};
 use super::work::TooLarge;
 use ftc_plant::PlantError;
 
@@ -36,8 +36,9 @@ pub enum RequestError {
     },
     /// The response length is out of its range.
     #[error(
-        "the response length is {length} samples, but with {inputs} inputs it must lie between 1 and {most}: \
-         ask for another length, or choose a longer sample time"
+        "the response length is {length} samples, but with {} it must lie between 1 and {most}: \
+         ask for another length, or choose a longer sample time",
+        counted(*inputs, "input", "inputs")
     )]
     ResponseLength {
         /// In samples.
@@ -80,9 +81,9 @@ pub enum RequestError {
     },
     /// The log of a mode excites an input too little.
     #[error(
-        "mode {mode}: the log excites input {input} ({name}) {lag} samples back too little (1 : {:.0e} of the strongest \
+        "mode {mode}: the log excites input {input} ({name}) {} back too little (1 : {:.0e} of the strongest \
          direction): record a run in which every input moves on its own",
-        1.0 / ratio.max(f64::MIN_POSITIVE)
+        counted(*lag, "sample", "samples"), 1.0 / ratio.max(f64::MIN_POSITIVE)
     )]
     Excitation {
         /// The mode.
@@ -156,7 +157,8 @@ pub enum RequestError {
     },
     /// A theorem as printed does not fit the plant's sizes.
     #[error(
-        "equation {equation} as printed needs as many outputs as states, but the plant has {outputs} and {states}"
+        "equation {equation} as printed needs as many outputs as states, but the plant has {outputs} and {states}: \
+         use the corrected theorems"
     )]
     Printed {
         /// Number of the equation.

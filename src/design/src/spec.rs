@@ -1,6 +1,7 @@
 //! What the user asks for.
 
 use super::Lyapunov;
+use super::words::counted;
 use core::f64::consts::{PI, TAU};
 use ftc_plant::Dimensions;
 use ftc_plant::scaling::Scaling;
@@ -34,6 +35,13 @@ pub struct ControlSpec {
     pub input_weight: Vec<f64>,
 }
 
+/// The largest magnitude of a weight, an operating point, a threshold or any other number that is asked for: no physical
+/// quantity in reasonable units is larger, and beyond it products overflow.
+pub const LARGEST: f64 = 1e15;
+
+/// The longest latency in samples.
+pub const LONGEST_LATENCY: usize = 1;
+
 /// What is wrong with a request, whatever the plant's numbers. Outputs and harmonics count from 1.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
@@ -43,7 +51,7 @@ pub enum SpecError {
     NothingTracked,
     /// More outputs are tracked than there are inputs.
     #[error(
-        "{tracked} tracked outputs need at least {tracked} inputs, but the plant has {inputs}: track fewer outputs"
+        "{tracked} tracked outputs need as many inputs, but the plant has {inputs}: track fewer outputs"
     )]
     TooFewInputs {
         /// Tracked outputs.
@@ -102,7 +110,7 @@ pub enum SpecError {
         angle: f64,
     },
     /// A list of weights has the wrong length.
-    #[error("the {weight} weight has {found} entries: give {needed}")]
+    #[error("the {weight} weight has {}: give {needed}", counted(*.found, "entry", "entries"))]
     WeightCount {
         /// Which weight.
         weight: Weight,
@@ -111,9 +119,14 @@ pub enum SpecError {
         /// Entries needed.
         needed: usize,
     },
-    /// A weight is negative, infinite or no number.
-    #[error("the {0} weight has an entry that is negative or not finite: give numbers from 0 on")]
-    Weight(Weight),
+    /// A weight is negative, no number or beyond [`LARGEST`].
+    #[error("the {weight} weight has the entry {value}: give a number from 0 to {LARGEST:e}")]
+    Weight {
+        /// Which weight.
+        weight: Weight,
+        /// The entry.
+        value: f64,
+    },
 }
 
 /// One of the weights of (T2).
@@ -242,7 +255,7 @@ impl ControlSpec {
                 return Err(SpecError::TrackedTwice(output + 1));
             }
         }
-        if self.latency > 1 {
+        if self.latency > LONGEST_LATENCY {
             return Err(SpecError::Latency(self.latency));
         }
         check_decay(DecayRate::Feedback, self.decay, self.lyapunov)?;
@@ -259,8 +272,9 @@ impl ControlSpec {
                     needed: size,
                 });
             }
-            if weights.iter().any(|w| !w.is_finite() || *w < 0.0) {
-                return Err(SpecError::Weight(weight));
+            let sound = |value: &&f64| (0.0..=LARGEST).contains(*value);
+            if let Some(&value) = weights.iter().find(|value| !sound(value)) {
+                return Err(SpecError::Weight { weight, value });
             }
         }
         Ok(())

@@ -2,6 +2,18 @@
 
 use nalgebra::Complex;
 
+/// So many of a thing, `one` or `many`.
+///
+/// ```
+/// use ftc_design::words::counted;
+///
+/// assert_eq!(counted(1, "entry", "entries"), "1 entry");
+/// assert_eq!(counted(0, "entry", "entries"), "0 entries");
+/// ```
+pub fn counted(count: usize, one: &str, many: &str) -> String {
+    format!("{count} {}", if count == 1 { one } else { many })
+}
+
 /// The values between two ends, either of which may be open.
 pub fn interval(min: Option<f64>, max: Option<f64>) -> String {
     match (min, max) {

@@ -181,7 +181,7 @@ pub enum Error {
     },
     /// A mode has too few rows.
     #[error(
-        "mode {mode} has {samples} usable samples, {needed} are needed: record healthy operation for longer"
+        "mode {mode}: of {needed} usable samples that are needed there are {samples}: record healthy operation for longer"
     )]
     TooShort {
         /// Mode, from 1.

@@ -14,10 +14,7 @@ pub enum PlantError {
     #[error("mode 1 has no {0}: give at least one")]
     Empty(&'static str),
     /// A matrix of the first mode does not fit its `A`.
-    #[error(
-        "mode 1: {matrix} is {} x {}, {}",
-        found.0, found.1, fitting(matrix, *found, *needed, *states)
-    )]
+    #[error("mode 1: {matrix} {}", fitting(matrix, *found, *needed, *states))]
     Shape {
         /// `A`, `B`, `C`, `E` or `F`.
         matrix: &'static str,
@@ -29,11 +26,7 @@ pub enum PlantError {
         states: usize,
     },
     /// A matrix of a later mode does not have the size it has in the first.
-    #[error(
-        "mode {mode}: {matrix} is {} x {}, but mode 1 makes it {} x {}{}",
-        found.0, found.1, needed.0, needed.1,
-        if (found.1, found.0) == *needed { ": it is transposed" } else { "" }
-    )]
+    #[error("mode {mode}: {matrix} {}", as_in_the_first(*found, *needed))]
     OtherShape {
         /// The mode.
         mode: usize,
@@ -58,7 +51,7 @@ pub enum PlantError {
     },
     /// A part of an operating point has the wrong length.
     #[error(
-        "mode {mode}: {part} of the operating point has {found} entries: give the {needed} that the plant needs"
+        "mode {mode}: {part} of the operating point has {found} where the plant needs {needed}: give as many"
     )]
     OperatingPointLength {
         /// The mode.
@@ -80,6 +73,40 @@ pub enum PlantError {
     },
 }
 
+impl PlantError {
+    /// What is wrong with the size of a matrix: the end of a sentence that begins with its name. None of
+    /// another error.
+    pub fn misfit(&self) -> Option<String> {
+        match self {
+            Self::Shape {
+                matrix,
+                found,
+                needed,
+                states,
+            } => Some(fitting(matrix, *found, *needed, *states)),
+            Self::OtherShape { found, needed, .. } => Some(as_in_the_first(*found, *needed)),
+            _ => None,
+        }
+    }
+}
+
+/// What size a matrix of a later mode must have.
+fn as_in_the_first(found: (usize, usize), needed: (usize, usize)) -> String {
+    let transposed = (found.1, found.0) == needed;
+    format!(
+        "is {} x {}, but in mode 1 it is {} x {}: {}",
+        found.0,
+        found.1,
+        needed.0,
+        needed.1,
+        if transposed {
+            "transpose it"
+        } else {
+            "give every mode the same sizes"
+        }
+    )
+}
+
 /// What size a matrix must have beside `A`, and whether it has it once transposed.
 fn fitting(matrix: &str, found: (usize, usize), needed: (usize, usize), states: usize) -> String {
     // The other size of these matrices was taken from their own, so a transposed one tells it wrongly.
@@ -88,11 +115,16 @@ fn fitting(matrix: &str, found: (usize, usize), needed: (usize, usize), states: 
         "C" if found.0 == states => Some((found.1, states)),
         _ => None,
     };
-    let wanted = format!("but with A of {states} x {states} it has to be");
+    let is = format!("is {} x {}, but", found.0, found.1);
+    let wanted = format!("{is} with A of {states} x {states} it has to be");
     match transposed {
-        Some((rows, columns)) => format!("{wanted} {rows} x {columns}: it seems to be transposed"),
-        None if matrix == "A" => "but A has to be square, a row and a column for each state".into(),
-        None => format!("{wanted} {} x {}", needed.0, needed.1),
+        Some((rows, columns)) => format!(
+            "{wanted} {rows} x {columns}: it seems to be transposed, give its columns as rows"
+        ),
+        None if matrix == "A" => {
+            format!("{is} has to be square: give a row and a column for each state")
+        }
+        None => format!("{wanted} {} x {}: give it that size", needed.0, needed.1),
     }
 }
 
@@ -102,11 +134,15 @@ mod tests {
 
     #[test]
     fn a_transposed_matrix_is_told_from_one_of_a_wrong_size() {
-        let begin = "but with A of 3 x 3 it has to be";
-        let says = |found: String, words: &str| found.starts_with(&format!("{begin} {words}"));
+        let says = |found: String, words: &str| {
+            found.contains(&format!(", but with A of 3 x 3 it has to be {words}"))
+        };
         assert!(says(fitting("B", (2, 3), (3, 3), 3), "3 x 2: it seems"));
         assert!(says(fitting("C", (3, 2), (3, 3), 3), "2 x 3: it seems"));
-        assert_eq!(fitting("B", (2, 2), (3, 2), 3), format!("{begin} 3 x 2"));
+        assert!(says(
+            fitting("B", (2, 2), (3, 2), 3),
+            "3 x 2: give it that size"
+        ));
         assert!(fitting("A", (2, 3), (2, 2), 2).contains("square"));
     }
 }

@@ -5,7 +5,7 @@ use serde::{Deserialize, Deserializer, Serialize, Serializer, de::Error};
 
 /// A matrix given by rows of different lengths.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("row {row} has {found} entries where row 1 has {needed}")]
+#[error("row {row} has the length {found}, but row 1 has {needed}")]
 #[non_exhaustive]
 pub struct RaggedRows {
     /// The first row that differs, from 1.

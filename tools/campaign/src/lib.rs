@@ -75,21 +75,16 @@ impl Default for Options {
 
 /// An option out of its range.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
+#[error("{} {}", self.option(), self.reason())]
 #[non_exhaustive]
 pub enum OptionsError {
     /// [`Options::model_error`].
-    #[error("model_error is {0}: give a fraction from 0 to 1")]
     ModelError(f64),
     /// [`Options::model_error`] of a design whose plant is nonlinear.
-    #[error(
-        "model_error is {0}, but it changes matrices and the plant of this design is nonlinear: leave it out"
-    )]
     NoMatrices(f64),
     /// [`Options::largest_fault`].
-    #[error("largest_fault is {0}: give 1 to 1e6 thresholds")]
     LargestFault(f64),
     /// [`Options::most_faults`].
-    #[error("most_faults is {0}: give at most 16")]
     MostFaults(u32),
 }
 
@@ -100,6 +95,18 @@ impl OptionsError {
             Self::ModelError(_) | Self::NoMatrices(_) => "model_error",
             Self::LargestFault(_) => "largest_fault",
             Self::MostFaults(_) => "most_faults",
+        }
+    }
+
+    /// The sentence behind the option's name.
+    pub fn reason(&self) -> String {
+        match self {
+            Self::ModelError(value) => format!("is {value}: give a fraction from 0 to 1"),
+            Self::NoMatrices(value) => format!(
+                "is {value}, but it changes matrices and the plant of this design is nonlinear: leave it out"
+            ),
+            Self::LargestFault(value) => format!("is {value}: give 1 to 1e6 thresholds"),
+            Self::MostFaults(value) => format!("is {value}: give at most 16"),
         }
     }
 }

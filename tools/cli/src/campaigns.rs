@@ -1,10 +1,10 @@
 //! `campaign`: thousands of seeded random runs, in threads, shards and sittings.
 
-use crate::failure::option;
+use crate::failure::{number, option, whole};
 use crate::progress::{Progress, Runs};
 use crate::{check_output, failure::Failure};
 use campaign::files::{self, PAGE, RESULT, RowFile};
-use campaign::{Options, Partial, Watch};
+use campaign::{Options, OptionsError, Partial, Watch};
 use clap::Args;
 use ftc_design::Design;
 use report::Made;
@@ -26,13 +26,13 @@ pub struct Arguments {
     out: PathBuf,
     /// Number of runs of the whole campaign: 1000 if left out; with --merge and --resume as many as
     /// were asked for before.
-    #[arg(long, value_parser = clap::value_parser!(u64).range(1..=1_000_000_000))]
+    #[arg(long, value_parser = whole::<u64>(1, 1_000_000_000), allow_negative_numbers = true)]
     runs: Option<u64>,
     /// Seed: the same one gives the same runs.
-    #[arg(long, default_value_t = 1)]
+    #[arg(long, default_value_t = 1, value_parser = whole::<u64>(0, u64::MAX), allow_negative_numbers = true)]
     seed: u64,
     /// Threads; as many as the machine has if left out. The results do not depend on it.
-    #[arg(long, value_parser = clap::value_parser!(u16).range(1..=1024))]
+    #[arg(long, value_parser = whole::<u16>(1, 1024), allow_negative_numbers = true)]
     jobs: Option<u16>,
     /// Do only shard I of N (from 1): put them together with --merge.
     #[arg(long, value_name = "I/N", value_parser = parse_shard)]
@@ -47,17 +47,19 @@ pub struct Arguments {
     #[arg(long)]
     rows: bool,
     /// Write run number RUN sample by sample instead, as simulate does.
-    #[arg(long, value_name = "RUN", conflicts_with_all = ["shard", "rows", "resume"])]
+    #[arg(long, value_name = "RUN", conflicts_with_all = ["shard", "rows", "resume"], allow_negative_numbers = true,
+          value_parser = whole::<u64>(0, u64::MAX))]
     replay: Option<u64>,
     /// Largest relative error of the entries of A, B and E (sampled); 0.02 if left out, and none of a
     /// nonlinear plant.
-    #[arg(long)]
+    #[arg(long, value_parser = number, allow_negative_numbers = true)]
     model_error: Option<f64>,
     /// Largest fault, in thresholds of its sensor.
-    #[arg(long, default_value_t = Options::default().largest_fault)]
+    #[arg(long, default_value_t = Options::default().largest_fault, value_parser = number, allow_negative_numbers = true)]
     largest_fault: f64,
     /// The most faults in one run.
-    #[arg(long, default_value_t = Options::default().most_faults)]
+    #[arg(long, default_value_t = Options::default().most_faults, allow_negative_numbers = true,
+          value_parser = whole::<u32>(0, u64::MAX))]
     most_faults: u32,
 }
 
@@ -80,7 +82,7 @@ impl Arguments {
     pub fn check(&self) -> Result<(), Failure> {
         check_output(&self.out)?;
         let checked = self.options().check();
-        checked.map_err(|error| refused(&option(error.option()), error))
+        checked.map_err(misfit)
     }
 
     fn options(&self) -> Options {
@@ -104,6 +106,11 @@ impl Arguments {
     }
 }
 
+/// An option of the runs that does not fit.
+fn misfit(error: OptionsError) -> Failure {
+    Failure::Input(format!("{} {}", option(error.option()), error.reason()))
+}
+
 /// An option that does not fit.
 fn refused(option: &str, what: impl std::fmt::Display) -> Failure {
     Failure::Input(format!("{option}: {what}"))
@@ -118,7 +125,7 @@ pub fn run(
 ) -> Result<String, Failure> {
     if arguments.model_error.is_some() {
         let checked = arguments.options().check_model_error(&made.design);
-        checked.map_err(|what| refused("--model-error", what))?;
+        checked.map_err(misfit)?;
     }
     if let Some(run) = arguments.replay {
         return replay(made, arguments, run, &progress);
@@ -155,7 +162,8 @@ fn merge(design: &Design, arguments: &Arguments) -> Result<(Partial, u64), Failu
         .iter()
         .map(|path| files::read(path))
         .collect();
-    let (parts, asked): (Vec<Partial>, Vec<u64>) = parts?.into_iter().unzip();
+    let parts = parts.map_err(|error| refused("--merge", error))?;
+    let (parts, asked): (Vec<Partial>, Vec<u64>) = parts.into_iter().unzip();
     let together = asked.into_iter().fold(0, u64::saturating_add);
     let whole = campaign::merge(parts).map_err(|error| refused("--merge", error))?;
     if !whole.is_of(design) {
@@ -176,7 +184,12 @@ fn work(design: &Design, arguments: &Arguments, quiet: bool) -> Result<(Partial,
     let mut whole = Partial::new(design, &options);
     let mut asked = None;
     if arguments.resume {
-        let (before, runs) = files::read(&arguments.out.join(RESULT))?;
+        let (before, runs) = files::read(&arguments.out.join(RESULT)).map_err(|error| {
+            refused(
+                "--resume",
+                format!("{error}, or leave it out to begin anew"),
+            )
+        })?;
         asked = Some(runs);
         whole = campaign::merge([whole, before]).map_err(|error| refused("--resume", error))?;
     }

@@ -1,5 +1,6 @@
 //! Why a command ends without success, and with which exit code.
 
+use design_file::values::NameOrList;
 use design_file::wording;
 use ftc_design::{ControlSpec, DesignError};
 use report::summary;
@@ -34,12 +35,17 @@ pub enum Failure {
 }
 
 impl Failure {
-    /// Sorts a design error: an ill-formed request is the design file's fault.
-    pub fn new(path: &Path, asked: ControlSpec, error: ftc_design::Failure) -> Self {
+    /// Sorts a design error: an ill-formed request is the design file's fault. `logs` are those it names.
+    pub fn new(
+        path: &Path,
+        asked: ControlSpec,
+        error: ftc_design::Failure,
+        logs: Option<&NameOrList>,
+    ) -> Self {
         let file = path.display().to_string();
         match error.error {
             DesignError::Request(what) => {
-                Self::Input(format!("{file}: {}", wording::of_request(&what)))
+                Self::Input(format!("{file}: {}", wording::of_request(&what, logs)))
             }
             _ => Self::NoDesign {
                 file,
@@ -98,15 +104,35 @@ impl From<package::Error> for Failure {
     fn from(error: package::Error) -> Self {
         match error {
             package::Error::Output(error) => error.into(),
+            package::Error::Key {
+                option: name,
+                file,
+                what,
+            } => Self::Input(format!("{} {}: {what}", option(name), file.display())),
             error => Self::Input(error.to_string()),
         }
     }
 }
 
-impl From<campaign::files::Error> for Failure {
-    fn from(error: campaign::files::Error) -> Self {
-        Self::Input(error.to_string())
+/// Reads a whole number of an option, within bounds.
+pub fn whole<T: TryFrom<u64>>(least: u64, most: u64) -> impl Fn(&str) -> Result<T, String> + Clone {
+    move |text| {
+        let number = text
+            .parse()
+            .ok()
+            .filter(|number| (least..=most).contains(number));
+        number
+            .and_then(|number| T::try_from(number).ok())
+            .ok_or_else(|| match most {
+                u64::MAX => format!("give a whole number, {least} or more"),
+                most => format!("give a whole number from {least} to {most}"),
+            })
     }
+}
+
+/// Reads a number of an option.
+pub fn number(text: &str) -> Result<f64, String> {
+    text.parse().map_err(|_| "give a number".into())
 }
 
 /// The option that gives the value of this key.

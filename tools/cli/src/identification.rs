@@ -1,7 +1,7 @@
 //! `identify`: from logs of healthy operation to a design file.
 
-use crate::failure::Failure;
-use design_file::identification::{self, Asked};
+use crate::failure::{Failure, number, whole};
+use design_file::identification::{self, Asked, MOST_HARMONICS};
 use std::path::{Path, PathBuf};
 
 /// The arguments of `identify`.
@@ -24,16 +24,17 @@ pub struct Arguments {
     #[arg(long, value_name = "NAME")]
     time: Option<String>,
     /// Seconds between two rows, where no column tells the time.
-    #[arg(long, value_name = "SECONDS")]
+    #[arg(long, value_name = "SECONDS", value_parser = number, allow_negative_numbers = true)]
     sample_time: Option<f64>,
     /// Period of a disturbance that is in the logs and that was not measured: it is told from the plant.
-    #[arg(long, value_name = "SECONDS")]
+    #[arg(long, value_name = "SECONDS", value_parser = number, allow_negative_numbers = true)]
     period: Option<f64>,
     /// Harmonics of that disturbance, the fundamental included.
-    #[arg(long, default_value_t = 1, requires = "period", value_parser = clap::value_parser!(u32).range(1..=50))]
+    #[arg(long, default_value_t = 1, requires = "period", allow_negative_numbers = true,
+          value_parser = whole::<u32>(1, MOST_HARMONICS as u64))]
     harmonics: u32,
     /// Number of states; by default the smallest that fits nearly as well as the best.
-    #[arg(long)]
+    #[arg(long, value_parser = whole::<usize>(1, u64::MAX), allow_negative_numbers = true)]
     order: Option<usize>,
 }
 

@@ -53,8 +53,8 @@ struct Arguments {
     solver: SolverChoice,
     /// Work on so many independent parts of a design at the same time, such as the modes under dwell and sets
     /// of lost sensors. The design does not depend on it; memory grows with it.
-    #[arg(long, global = true, value_name = "N", default_value_t = 1,
-          value_parser = clap::value_parser!(u16).range(1..=1024))]
+    #[arg(long, global = true, value_name = "N", default_value_t = 1, allow_negative_numbers = true,
+          value_parser = failure::whole::<u16>(1, 1024))]
     threads: u16,
 }
 
@@ -388,7 +388,7 @@ fn theorems_as_printed(path: &Path, request: &Request, json: bool) -> Result<Str
         ])
     };
     let verdicts = solve().map_err(|error: ftc_design::DesignError| {
-        Failure::new(path, request.control.clone(), error.into())
+        Failure::new(path, request.control.clone(), error.into(), None)
     })?;
     let output = match json {
         true => as_printed::json(&verdicts),
@@ -557,7 +557,7 @@ fn solve(path: &Path, how: &How, progress: &Progress) -> Result<Made, Failure> {
             };
             made.map_err(|error| {
                 eprint!("{}", warnings::text(&source.notes));
-                Failure::new(path, asked, error)
+                Failure::new(path, asked, error, source.logs())
             })?
         }
     };

@@ -563,7 +563,12 @@ fn damaged_logs_are_refused_in_one_sentence() {
         (
             "too few samples",
             log(&good[..40]),
-            &["mode 1", "40 samples are too few", "record at least"],
+            &[
+                "mode 1",
+                "40 samples are too few",
+                "record at least",
+                "estimator.response_length",
+            ],
         ),
         (
             "nothing moves",
@@ -574,7 +579,7 @@ fn damaged_logs_are_refused_in_one_sentence() {
                 }
                 log(&rows)
             },
-            &["mode 1", "excites nothing"],
+            &["mode 1", "excites nothing", "record a run"],
         ),
         (
             "one input never moves",
@@ -600,7 +605,8 @@ fn damaged_logs_are_refused_in_one_sentence() {
     assert!(cases.len() >= 12);
     let two = log(&rows(1, 200, 0));
     for (case, one, words) in cases {
-        refused(case, PAIR, &[("one.csv", &one), ("two.csv", &two)], words);
+        let words = [words, &["one.csv: "]].concat();
+        refused(case, PAIR, &[("one.csv", &one), ("two.csv", &two)], &words);
     }
 }
 
@@ -619,7 +625,7 @@ fn files_that_do_not_fit_the_modes() {
         "one of two",
         "[\"one.csv\"]",
         &pair,
-        &["lists 1 logs", "one per mode, 2"],
+        &["lists 1 log:", "one per mode, 2"],
     );
     refused("no list", "[]", &pair, &["lists 0 logs"]);
     refused(
@@ -707,11 +713,10 @@ fn the_state_based_estimator_fits_its_model_to_the_log() {
     fs::write(bench.path("logged_closed.csv"), early).unwrap();
     let run = bench.run(&["design", FILE]);
     assert_eq!(run.code(), 2, "{}", run.stdout());
-    assert!(
-        run.stderr().contains("one sample after the row"),
-        "{}",
-        run.stderr()
-    );
+    let said = run.stderr();
+    let begins = "error: design.toml: estimator.database: logged_closed.csv: mode 1: ";
+    assert!(said.starts_with(begins), "{said}");
+    assert!(said.contains("one sample after the row"), "{said}");
 }
 
 /// A log that no estimator uses is refused rather than ignored.
@@ -735,7 +740,7 @@ fn refused(case: &str, database: &str, files: &[(&str, &str)], words: &[&str]) {
     let message = run.stderr();
     assert_eq!(run.code(), 2, "{case}: {message}");
     assert_eq!(message.trim_end().lines().count(), 1, "{case}: {message}");
-    for word in words {
+    for word in words.iter().chain(&[FILE, "estimator.database"]) {
         assert!(message.contains(word), "{case}: no '{word}' in {message}");
     }
 }

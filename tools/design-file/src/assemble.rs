@@ -3,6 +3,7 @@
 //! Every error is the end of a sentence that begins with the file's name.
 
 use crate::check;
+use crate::complaint::{Complaint, Key, at};
 use crate::defaults;
 use crate::estimator::estimator;
 use crate::experiment::ScenarioContext;
@@ -14,14 +15,16 @@ use crate::schema::{
 };
 use crate::signal::Tables;
 use crate::true_plant;
-use crate::values::NumberOrList;
+use crate::values::{NumberOrList, Which};
+use crate::wording;
 use ftc_control::estimator::hypotheses::MOST_MODES;
 use ftc_control::parameters;
 use ftc_design::assembly::{KnownDisturbance, Request};
+use ftc_design::spec::LONGEST_LATENCY;
+use ftc_design::words::counted;
 use ftc_design::{ControlSpec, Lyapunov, Objective, ObserverSpec, Signal, Signals};
 use ftc_plant::scaling::{Known, Scaling};
 use ftc_plant::{Dimensions, OperatingPoint, SwitchedPlant};
-use std::fmt::Display;
 use std::path::Path;
 
 /// The largest number of states, inputs, outputs, disturbances or modes.
@@ -33,8 +36,12 @@ pub(crate) const MOST_STEPS: usize = 1_000_000;
 /// gets what the user should know of them.
 ///
 /// # Errors
-/// One sentence that names the key and what to do.
-pub(crate) fn request(file: &DesignFile, folder: &Path, notes: &Notes) -> Result<Request, String> {
+/// What is wrong with which key, and what to do.
+pub(crate) fn request(
+    file: &DesignFile,
+    folder: &Path,
+    notes: &Notes,
+) -> Result<Request, Complaint> {
     at("name", check::identifier(&file.name))?;
     let given = plant::read(file, folder, notes)?;
     let signals = signals(&file.signals, &given)?;
@@ -44,7 +51,11 @@ pub(crate) fn request(file: &DesignFile, folder: &Path, notes: &Notes) -> Result
     let disturbance = disturbance(file, dims)?;
     let mut control = control(&file.controller, &signals, dims)?;
     control.resonators = resonators(file, disturbance.as_ref())?;
-    let observer = observer(&file.observer, &control)?;
+    control
+        .check(dims)
+        .map_err(|error| wording::of_spec(&error))?;
+    let observer = observer(&file.observer, &control);
+    observer.check().map_err(|error| wording::of_spec(&error))?;
     let logs = Logs {
         plant: &plant,
         signals: &signals,
@@ -54,9 +65,12 @@ pub(crate) fn request(file: &DesignFile, folder: &Path, notes: &Notes) -> Result
     };
     let estimator = estimator(&file.estimator, disturbance, dims, &logs)?;
     if estimator.hypotheses.mode_length.is_some() && plant.modes.len() > MOST_MODES {
-        return Err(format!(
-            "estimator.mode = \"estimated\" finds one of at most {MOST_MODES} modes, but the plant has {}: tell the mode",
-            plant.modes.len()
+        return Err(Complaint::of(
+            "estimator.mode",
+            format!(
+                "= \"estimated\" finds one of at most {MOST_MODES} modes, but the plant has {}: tell the mode",
+                plant.modes.len()
+            ),
         ));
     }
     let scenario = ScenarioContext {
@@ -86,12 +100,7 @@ pub(crate) fn request(file: &DesignFile, folder: &Path, notes: &Notes) -> Result
     Ok(request)
 }
 
-/// Puts the key before a complaint.
-pub(crate) fn at<T>(key: &str, result: Result<T, impl Display>) -> Result<T, String> {
-    result.map_err(|what| format!("{key} {what}"))
-}
-
-fn signals(given: &schema::Signals, found: &plant::Found) -> Result<Signals, String> {
+fn signals(given: &schema::Signals, found: &plant::Found) -> Result<Signals, Complaint> {
     let plant = &found.plant;
     let dims = plant.dimensions();
     let points = |pick: fn(&OperatingPoint) -> &Vec<f64>| -> Vec<&[f64]> {
@@ -144,23 +153,27 @@ fn channels(
     given: &Option<Vec<SignalInfo>>,
     size: usize,
     points: &[&[f64]],
-) -> Result<Vec<Signal>, String> {
+) -> Result<Vec<Signal>, Complaint> {
+    let list = Key::from("signals").then(key);
     let unnamed = vec![SignalInfo::default(); size];
     let given = given.as_ref().unwrap_or(&unnamed);
     if given.len() != size {
-        return Err(format!(
-            "signals.{key} has {} entries: the plant needs {size}",
-            given.len()
+        return Err(Complaint::of(
+            list,
+            format!(
+                "has {}, but the plant has {size}: give one for each",
+                counted(given.len(), "entry", "entries")
+            ),
         ));
     }
-    let signals: Result<Vec<Signal>, String> = given
+    let signals: Result<Vec<Signal>, Complaint> = given
         .iter()
         .enumerate()
         .map(|(index, info)| {
             let largest = points.iter().map(|point| point[index].abs());
             let name = format!("{letter}[{}]", index + 1);
             signal(info, name, largest.fold(0.0, f64::max))
-                .map_err(|what| format!("signals.{key}[{}].{what}", index + 1))
+                .map_err(|what| what.inside(list.clone().entry(index)))
         })
         .collect();
     let signals = signals?;
@@ -169,10 +182,12 @@ fn channels(
             .iter()
             .any(|other| other.name == signal.name)
         {
-            return Err(format!(
-                "signals.{key}[{}].name \"{}\" is used twice: give each signal its own",
-                index + 1,
-                signal.name
+            return Err(Complaint::of(
+                list.entry(index).then("name"),
+                format!(
+                    "= \"{}\" is used twice: give each signal its own",
+                    signal.name
+                ),
             ));
         }
     }
@@ -180,7 +195,7 @@ fn channels(
 }
 
 /// One signal; `operating` is its largest magnitude among the operating points.
-fn signal(info: &SignalInfo, default_name: String, operating: f64) -> Result<Signal, String> {
+fn signal(info: &SignalInfo, default_name: String, operating: f64) -> Result<Signal, Complaint> {
     let SignalInfo { min, max, .. } = *info;
     for (key, bound) in [("min", min), ("max", max)] {
         at(key, bound.map_or(Ok(()), check::number))?;
@@ -188,18 +203,27 @@ fn signal(info: &SignalInfo, default_name: String, operating: f64) -> Result<Sig
     if let (Some(min), Some(max)) = (min, max)
         && min >= max
     {
-        return Err(format!("min is {min}, max is {max}: give a min below max"));
+        return Err(Complaint::of(
+            "min",
+            format!("is {min}, max is {max}: give a min below max"),
+        ));
     }
     at("nominal", info.nominal.map_or(Ok(()), check::positive))?;
     let range = min.zip(max).map(|(min, max)| (max - min) / 2.0);
     let operating = (operating > 0.0).then_some(operating);
     let name = info.name.clone().unwrap_or(default_name);
     if name.trim().is_empty() || !check::printable(&name) {
-        return Err("name is empty or not printable: give a name, or leave the key out".into());
+        return Err(Complaint::of(
+            "name",
+            "is empty or not printable: give a name, or leave the key out",
+        ));
     }
     let unit = info.unit.clone().filter(|unit| !unit.trim().is_empty());
     if unit.as_deref().is_some_and(|unit| !check::printable(unit)) {
-        return Err("unit has a character that is not printable: give the unit's letters".into());
+        return Err(Complaint::of(
+            "unit",
+            "has a character that is not printable: give the unit's letters",
+        ));
     }
     let mut signal = Signal::new(&name);
     signal.unit = unit;
@@ -258,17 +282,18 @@ fn control(
     given: &schema::Controller,
     signals: &Signals,
     dims: Dimensions,
-) -> Result<ControlSpec, String> {
+) -> Result<ControlSpec, Complaint> {
     let usual = ControlSpec::tracking(tracked(given, signals, dims)?, &signals.scaling());
     let latency = given.latency.map_or(Ok(usual.latency), |latency| {
-        at("controller.latency", check::count(latency, 0, 1))
+        at(
+            "controller.latency",
+            check::count(latency, 0, LONGEST_LATENCY),
+        )
     })?;
-    let decay = given.decay.unwrap_or(usual.decay);
-    at("controller.decay", check::decay(decay))?;
     let mut spec = usual;
     spec.latency = latency;
     spec.lyapunov = given.lyapunov.map_or(spec.lyapunov, lyapunov);
-    spec.decay = decay;
+    spec.decay = given.decay.unwrap_or(spec.decay);
     spec.objective = match given.objective {
         None => spec.objective,
         Some(ObjectiveKind::Attenuation) => Objective::Attenuation,
@@ -288,15 +313,15 @@ fn control(
 fn resonators(
     file: &DesignFile,
     disturbance: Option<&KnownDisturbance>,
-) -> Result<Vec<f64>, String> {
+) -> Result<Vec<f64>, Complaint> {
     let wanted = file.controller.internal_model;
     match (wanted.unwrap_or(defaults::INTERNAL_MODEL), disturbance) {
         (false, _) => Ok(Vec::new()),
         (true, Some(known)) => Ok(known.angles(file.sample_time)),
-        (true, None) => Err(
-            "controller.internal_model = true needs to know the disturbance: give [disturbance] with its period"
-                .into(),
-        ),
+        (true, None) => Err(Complaint::of(
+            "controller.internal_model",
+            "= true needs to know the disturbance: give [disturbance] with its period",
+        )),
     }
 }
 
@@ -312,40 +337,16 @@ fn tracked(
     given: &schema::Controller,
     signals: &Signals,
     dims: Dimensions,
-) -> Result<Vec<usize>, String> {
+) -> Result<Vec<usize>, Complaint> {
     let Some(given) = &given.tracked else {
         return Ok((0..dims.outputs.min(dims.inputs)).collect());
     };
-    if given.is_empty() {
-        return Err(
-            "controller.tracked is empty: name at least one output, or count it from 1".into(),
-        );
-    }
     let names = names(&signals.outputs);
-    let mut tracked = Vec::new();
-    for which in given {
-        let output = which
-            .index(
-                "controller.tracked contains an entry that",
-                &names,
-                "outputs",
-            )
-            .map_err(|what| what.to_string())?;
-        if tracked.contains(&output) {
-            return Err(format!(
-                "controller.tracked names output {which} twice: name each output once"
-            ));
-        }
-        tracked.push(output);
-    }
-    if tracked.len() > dims.inputs {
-        return Err(format!(
-            "controller.tracked names {} outputs, but the plant has {} inputs: track at most as many outputs as there are inputs",
-            tracked.len(),
-            dims.inputs
-        ));
-    }
-    Ok(tracked)
+    let key = Key::from("controller.tracked");
+    let output = |(index, which): (usize, &Which)| {
+        at(key.clone().entry(index), which.index(&names, "outputs"))
+    };
+    given.iter().enumerate().map(output).collect()
 }
 
 /// What signals are called.
@@ -354,22 +355,16 @@ pub(crate) fn names(signals: &[Signal]) -> Vec<&str> {
 }
 
 /// The weight of each channel.
-fn weight(key: &str, given: &Option<NumberOrList>, usual: Vec<f64>) -> Result<Vec<f64>, String> {
-    let key = format!("controller.{key}");
+fn weight(key: &str, given: &Option<NumberOrList>, usual: Vec<f64>) -> Result<Vec<f64>, Complaint> {
     let Some(given) = given else {
         return Ok(usual);
     };
-    let weights = at(&key, given.spread(usual.len()))?;
-    at(&key, check::each(&weights, check::not_negative))?;
-    Ok(weights)
+    at(Key::from("controller").then(key), given.spread(usual.len()))
 }
 
-fn observer(given: &schema::Observer, control: &ControlSpec) -> Result<ObserverSpec, String> {
+fn observer(given: &schema::Observer, control: &ControlSpec) -> ObserverSpec {
     use ftc_design::ObserverChoice as Kind;
-    let usual = ObserverSpec::beside(control);
-    let decay = given.decay.unwrap_or(usual.decay);
-    at("observer.decay", check::decay(decay))?;
-    let mut observer = usual;
+    let mut observer = ObserverSpec::beside(control);
     observer.kind = match given.kind {
         None => observer.kind,
         Some(ObserverKind::Uio) => Kind::Uio,
@@ -377,11 +372,11 @@ fn observer(given: &schema::Observer, control: &ControlSpec) -> Result<ObserverS
         Some(ObserverKind::Kalman) => Kind::Kalman,
         Some(ObserverKind::Auto) => Kind::Auto,
     };
-    observer.decay = decay;
-    Ok(observer)
+    observer.decay = given.decay.unwrap_or(observer.decay);
+    observer
 }
 
-fn disturbance(file: &DesignFile, dims: Dimensions) -> Result<Option<KnownDisturbance>, String> {
+fn disturbance(file: &DesignFile, dims: Dimensions) -> Result<Option<KnownDisturbance>, Complaint> {
     let Some(given) = &file.disturbance else {
         return Ok(None);
     };
@@ -398,10 +393,23 @@ fn disturbance(file: &DesignFile, dims: Dimensions) -> Result<Option<KnownDistur
         }
     };
     if given.period / harmonics as f64 <= shortest {
-        return Err(format!(
-            "disturbance.period is {}: {harmonics} harmonics of it need a period above {} seconds at this sample_time",
-            given.period,
-            shortest * harmonics as f64
+        let fewer = match harmonics {
+            1 => String::new(),
+            _ => format!(" with {harmonics} harmonics"),
+        };
+        return Err(Complaint::of(
+            "disturbance.period",
+            format!(
+                "is {}, but{fewer} it has to be above {} seconds at this sample_time: give a longer period{}, or choose a \
+                 shorter sample_time",
+                given.period,
+                shortest * harmonics as f64,
+                if harmonics > 1 {
+                    ", set fewer disturbance.harmonics"
+                } else {
+                    ""
+                }
+            ),
         ));
     }
     let amplitude = match &given.amplitude {

@@ -1,7 +1,8 @@
 //! What a value must satisfy, whatever key it stands under.
 
 use crate::sentence::shorten;
-use ftc_design::coverage::LARGEST;
+use ftc_design::spec::LARGEST;
+use ftc_design::words::counted;
 
 /// No positive one is smaller; beyond it quotients overflow.
 const SMALLEST: f64 = 1.0 / LARGEST;
@@ -28,9 +29,16 @@ pub enum ValueError {
     /// No share of a whole.
     #[error("is {0}: give a fraction from 0 to 1")]
     Fraction(f64),
-    /// No decay rate per sample.
-    #[error("is {0}: give a number above 0 and below 1")]
-    Decay(f64),
+    /// A number beyond its bounds.
+    #[error("is {value}: give a number from {} to {}", short(*.least), short(*.most))]
+    Range {
+        /// The number.
+        value: f64,
+        /// The least allowed.
+        least: f64,
+        /// The most allowed.
+        most: f64,
+    },
     /// A count beyond its bounds.
     #[error("is {value}: give a whole number from {least} to {most}")]
     Count {
@@ -41,11 +49,12 @@ pub enum ValueError {
         /// The most allowed.
         most: usize,
     },
-    /// A number of a thing that does not exist. Unlike most others it begins with the key.
-    #[error("{key} is {number}: {things} are numbered from 1 to {total}")]
+    /// A negative seed.
+    #[error("is {0}: give a whole number, 0 or more")]
+    Seed(i64),
+    /// A number of a thing that does not exist.
+    #[error("is {number}: {things} are numbered from 1 to {total}")]
     Index {
-        /// The key.
-        key: String,
         /// The number, meant to count from 1.
         number: i64,
         /// How many things there are.
@@ -53,14 +62,9 @@ pub enum ValueError {
         /// What they are, in the plural.
         things: String,
     },
-    /// A name of nothing. It begins with the key, too.
-    #[error(
-        "{key} is \"{}\", the name of none of the {things}: {advice}",
-        shorten(name)
-    )]
+    /// A name of nothing.
+    #[error("is \"{}\", the name of none of the {things}: {advice}", shorten(name))]
     NoSuchName {
-        /// The key.
-        key: String,
         /// The name.
         name: String,
         /// What things are called, in the plural.
@@ -68,14 +72,12 @@ pub enum ValueError {
         /// Which names there are.
         advice: String,
     },
-    /// A name of more than one thing. It begins with the key, too.
+    /// A name of more than one thing.
     #[error(
-        "{key} is \"{}\", the name of several {things}: give the number, from 1 to {total}",
+        "is \"{}\", the name of several {things}: give the number, from 1 to {total}",
         shorten(name)
     )]
     SharedName {
-        /// The key.
-        key: String,
         /// The name.
         name: String,
         /// What things are called, in the plural.
@@ -84,7 +86,7 @@ pub enum ValueError {
         total: usize,
     },
     /// A list with another length than there are channels.
-    #[error("has {found} entries: give one number, or a list of {needed}")]
+    #[error("has {}: give one number, or a list of {needed}", counted(*.found, "entry", "entries"))]
     Entries {
         /// Entries found.
         found: usize,
@@ -99,9 +101,11 @@ pub enum ValueError {
     Identifier(String),
 }
 
-impl From<ValueError> for String {
-    fn from(error: ValueError) -> Self {
-        error.to_string()
+/// A number without many zeros.
+fn short(value: f64) -> String {
+    match value == 0.0 || (1e-4..1e6).contains(&value.abs()) {
+        true => value.to_string(),
+        false => format!("{value:e}"),
     }
 }
 
@@ -154,14 +158,14 @@ pub fn fraction(value: f64) -> Result<(), ValueError> {
     }
 }
 
-/// A decay rate per sample.
+/// A number between two bounds.
 ///
 /// # Errors
 /// Any other.
-pub fn decay(value: f64) -> Result<(), ValueError> {
-    match value > 0.0 && value < 1.0 {
-        true => Ok(()),
-        false => Err(ValueError::Decay(value)),
+pub fn range(value: f64, least: f64, most: f64) -> Result<f64, ValueError> {
+    match (least..=most).contains(&value) {
+        true => Ok(value),
+        false => Err(ValueError::Range { value, least, most }),
     }
 }
 
@@ -176,15 +180,22 @@ pub fn count(value: i64, least: usize, most: usize) -> Result<usize, ValueError>
         .ok_or(ValueError::Count { value, least, most })
 }
 
+/// A seed of random numbers.
+///
+/// # Errors
+/// One below zero.
+pub fn seed(value: i64) -> Result<u64, ValueError> {
+    u64::try_from(value).map_err(|_| ValueError::Seed(value))
+}
+
 /// A number counted from 1, as an index counted from 0.
 ///
 /// # Errors
-/// A number of nothing; the sentence begins with `key`.
-pub fn index(key: &str, number: i64, total: usize, things: &str) -> Result<usize, ValueError> {
+/// A number of nothing.
+pub fn index(number: i64, total: usize, things: &str) -> Result<usize, ValueError> {
     count(number, 1, total)
         .map(|number| number - 1)
         .map_err(|_| ValueError::Index {
-            key: key.to_string(),
             number,
             total,
             things: things.to_string(),

@@ -1,12 +1,13 @@
 //! The fault estimator that a design file asks for.
 
-use crate::assemble::at;
 use crate::check;
+use crate::complaint::{Complaint, Key, at};
 use crate::healthy_log::Logs;
 use crate::schema::{self, EstimatorMethod};
 use crate::values::{NameOrList, NumberOrList};
 use ftc_control::parameters;
 use ftc_design::assembly::{DatabaseSource, EstimatorSpec, KnownDisturbance, Threshold};
+use ftc_design::commissioning::longest_response;
 use ftc_design::{HypothesesSpec, MODE_LENGTH};
 use ftc_plant::Dimensions;
 
@@ -21,7 +22,7 @@ pub(crate) fn estimator(
     disturbance: Option<KnownDisturbance>,
     dims: Dimensions,
     logs: &Logs,
-) -> Result<EstimatorSpec, String> {
+) -> Result<EstimatorSpec, Complaint> {
     let usual = EstimatorSpec::default();
     let database = database(given, logs)?.unwrap_or(usual.database);
     let method = match (given.method, &database) {
@@ -37,7 +38,7 @@ pub(crate) fn estimator(
         None => None,
         Some(length) => Some(at(
             "estimator.response_length",
-            check::count(length, 1, ftc_design::commissioning::LONGEST_RESPONSE),
+            check::count(length, 1, longest_response(dims.inputs)),
         )?),
     };
     let debounce = match given.debounce {
@@ -56,10 +57,10 @@ pub(crate) fn estimator(
     };
     let hypotheses = hypotheses(given, dims)?;
     if hypotheses.mode_length.is_some() && method != parameters::EstimatorMethod::Observer {
-        return Err(
-            "estimator.mode = \"estimated\" is for method = \"observer\" only: change one of them"
-                .into(),
-        );
+        return Err(Complaint::of(
+            "estimator.mode",
+            "= \"estimated\" is for method = \"observer\" only: change one of them",
+        ));
     }
     let mut estimator = EstimatorSpec::default();
     estimator.method = method;
@@ -74,31 +75,28 @@ pub(crate) fn estimator(
     Ok(estimator)
 }
 
-fn hypotheses(given: &schema::Estimator, dims: Dimensions) -> Result<HypothesesSpec, String> {
+fn hypotheses(given: &schema::Estimator, dims: Dimensions) -> Result<HypothesesSpec, Complaint> {
     let usual = HypothesesSpec::default();
-    let within = |key: &str, value: Option<f64>, usual: f64, least: f64, most: f64| match value {
-        None => Ok(usual),
-        Some(value) if (least..=most).contains(&value) => Ok(value),
-        Some(value) => Err(format!(
-            "estimator.{key} is {value}: it must lie between {least} and {most}"
-        )),
+    let within = |key: &str, value: Option<f64>, usual: f64, least: f64, most: f64| {
+        let value = check::range(value.unwrap_or(usual), least, most);
+        at(Key::from("estimator").then(key), value)
     };
     let sizes = |key: &str, value: &Option<NumberOrList>, count: usize| match value {
         None => Ok(None),
         Some(value) => {
             let values = at(key, value.spread(count))?;
             at(key, check::each(&values, check::positive))?;
-            Ok::<_, String>(Some(values))
+            Ok::<_, Complaint>(Some(values))
         }
     };
     let estimated = given.mode == Some(schema::ModeSource::Estimated);
     let mode_length = match (estimated, given.mode_length) {
         (false, None) => None,
         (false, Some(_)) => {
-            return Err(
-                "estimator.mode_length is given, but the mode is told: add mode = \"estimated\", or remove it"
-                    .into(),
-            );
+            return Err(Complaint::of(
+                "estimator.mode_length",
+                "is given, but the mode is told: add mode = \"estimated\", or remove it",
+            ));
         }
         (true, length) => Some(within("mode_length", length, MODE_LENGTH, 2.0, 1e9)?),
     };
@@ -130,42 +128,49 @@ fn hypotheses(given: &schema::Estimator, dims: Dimensions) -> Result<HypothesesS
 }
 
 /// The database that is named, if any is.
-fn database(given: &schema::Estimator, logs: &Logs) -> Result<Option<DatabaseSource>, String> {
+fn database(given: &schema::Estimator, logs: &Logs) -> Result<Option<DatabaseSource>, Complaint> {
     let is_log = |name: &str| {
         let name = name.to_lowercase();
         LOG_ENDINGS.iter().any(|ending| name.ends_with(ending))
     };
-    let files = match &given.database {
-        None => return Ok(None),
-        Some(NameOrList::Name(name)) if name == "commission" => {
-            return Ok(Some(DatabaseSource::Commission));
-        }
-        Some(NameOrList::Name(name)) if name == "model" => return Ok(Some(DatabaseSource::Model)),
-        Some(NameOrList::Name(name)) if !is_log(name) => {
-            return Err(format!(
-                "estimator.database = \"{}\" is not a known value and no CSV file: {}",
-                crate::sentence::shorten(name),
-                crate::suggest::nearest(name, &["commission", "model"])
-            ));
-        }
-        Some(files) => files,
+    let Some(files) = given.logs() else {
+        return Ok(given.database.as_ref().map(|name| match name {
+            NameOrList::Name(name) if name == schema::MODEL => DatabaseSource::Model,
+            _ => DatabaseSource::Commission,
+        }));
     };
+    if let NameOrList::Name(name) = files
+        && !is_log(name)
+    {
+        return Err(Complaint::of(
+            "estimator.database",
+            format!(
+                "= \"{}\" is not a known value and no CSV file: {}",
+                crate::sentence::shorten(name),
+                crate::suggest::nearest(name, &[schema::COMMISSION, schema::MODEL])
+            ),
+        ));
+    }
     if let NameOrList::List(names) = files
         && let Some(name) = names.iter().find(|name| !is_log(name))
     {
-        return Err(format!(
-            "estimator.database lists \"{}\": list CSV files only, one per mode",
-            crate::sentence::shorten(name)
+        return Err(Complaint::of(
+            "estimator.database",
+            format!(
+                "lists \"{}\": list CSV files only, one per mode",
+                crate::sentence::shorten(name)
+            ),
         ));
     }
     if matches!(
         given.method,
         Some(EstimatorMethod::Sliding | EstimatorMethod::None)
     ) {
-        return Err(
-            "estimator.database names a log, which only the methods \"observer\" and \"reference\" use: change one of them"
-                .into(),
-        );
+        return Err(Complaint::of(
+            "estimator.database",
+            "names a log, which only the methods \"observer\" and \"reference\" use: set another estimator.method, or \
+             leave it out",
+        ));
     }
     let recorded = at("estimator.database", logs.read(files))?;
     Ok(Some(DatabaseSource::Recorded(recorded)))
@@ -175,11 +180,12 @@ fn threshold(
     given: &schema::Estimator,
     dims: Dimensions,
     usual: Threshold,
-) -> Result<Threshold, String> {
+) -> Result<Threshold, Complaint> {
     match (&given.threshold, given.sigmas) {
-        (Some(_), Some(_)) => Err(
-            "estimator.threshold and estimator.sigmas exclude each other: give one of them".into(),
-        ),
+        (Some(_), Some(_)) => Err(Complaint::of(
+            "estimator.threshold",
+            "and estimator.sigmas exclude each other: give one of them",
+        )),
         (Some(threshold), None) => {
             let values = at("estimator.threshold", threshold.spread(dims.outputs))?;
             at("estimator.threshold", check::each(&values, check::positive))?;

@@ -1,6 +1,7 @@
 //! Faults of sensors and actuators, as the user writes them.
 
 use crate::check;
+use crate::complaint::{Complaint, at};
 use crate::signal::{endless, finite, interval, only, positive, present};
 use crate::values::Which;
 use ftc_plant::scenario::{FaultEvent, FaultKind};
@@ -59,16 +60,16 @@ impl Event {
     /// The event for a plant with sensors of these names.
     ///
     /// # Errors
-    /// One sentence, to be put after the event's key.
-    pub(crate) fn fault(&self, sensors: &[&str]) -> Result<FaultEvent, String> {
+    /// What is wrong with which of its keys.
+    pub(crate) fn fault(&self, sensors: &[&str]) -> Result<FaultEvent, Complaint> {
         self.fault_of("sensor", sensors, "outputs")
     }
 
     /// The event for an actuator of a plant with inputs of these names.
     ///
     /// # Errors
-    /// One sentence, to be put after the event's key.
-    pub(crate) fn actuator_fault(&self, inputs: &[&str]) -> Result<FaultEvent, String> {
+    /// What is wrong with which of its keys.
+    pub(crate) fn actuator_fault(&self, inputs: &[&str]) -> Result<FaultEvent, Complaint> {
         self.fault_of("input", inputs, "inputs")
     }
 
@@ -94,7 +95,7 @@ impl Event {
         ]
     }
 
-    fn fault_of(&self, what: &str, names: &[&str], things: &str) -> Result<FaultEvent, String> {
+    fn fault_of(&self, what: &str, names: &[&str], things: &str) -> Result<FaultEvent, Complaint> {
         let (name, keys) = self.kind.keys();
         only(name, keys, &self.given())?;
         let size = || present("size", self.size).and_then(|size| finite("size", size));
@@ -105,7 +106,7 @@ impl Event {
             },
             Kind::GainLoss => {
                 let loss = present("loss", self.loss)?;
-                check::fraction(loss).map_err(|what| format!("loss {what}"))?;
+                at("loss", check::fraction(loss))?;
                 FaultKind::GainLoss { loss }
             }
             Kind::Stuck => FaultKind::Stuck,
@@ -117,7 +118,7 @@ impl Event {
         };
         interval(self.from, self.until)?;
         Ok(FaultEvent {
-            sensor: self.place(what)?.index(what, names, things)?,
+            sensor: at(what, self.place(what)?.index(names, things))?,
             from: self.from,
             until: self.until,
             kind,
@@ -125,17 +126,21 @@ impl Event {
     }
 
     /// Which sensor or which input's actuator fails.
-    fn place(&self, what: &str) -> Result<&Which, String> {
+    fn place(&self, what: &str) -> Result<&Which, Complaint> {
         let (own, other, others) = match what {
             "input" => (&self.input, "sensor", &self.sensor),
             _ => (&self.sensor, "input", &self.input),
         };
         match (own, others) {
-            (_, Some(_)) => Err(format!(
-                "{other} does not say where this fault is: give {what} alone"
+            (_, Some(_)) => Err(Complaint::of(
+                other,
+                format!("does not say where this fault is: give {what} alone"),
             )),
             (Some(place), None) => Ok(place),
-            (None, None) => Err(format!("{what} is missing: add its number or its name")),
+            (None, None) => Err(Complaint::of(
+                what,
+                "is missing: add its number or its name",
+            )),
         }
     }
 }

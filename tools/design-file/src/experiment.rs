@@ -1,7 +1,8 @@
 //! The experiment that a design file asks for.
 
-use crate::assemble::{MOST_STEPS, at, names};
+use crate::assemble::{MOST_STEPS, names};
 use crate::check;
+use crate::complaint::{Complaint, Key, at};
 use crate::defaults;
 use crate::schema;
 use crate::signal::{Signal as SignalOverTime, Tables};
@@ -9,6 +10,7 @@ use crate::true_plant::{beyond_the_end, mode_names};
 use crate::values::Which;
 use ftc_design::Signals;
 use ftc_design::assembly::KnownDisturbance;
+use ftc_design::words::counted;
 use ftc_plant::scenario::{ModeInterval, Waveform};
 use ftc_plant::{Dimensions, Scenario, SwitchedPlant};
 
@@ -26,36 +28,40 @@ pub(crate) struct ScenarioContext<'a> {
 }
 
 impl ScenarioContext<'_> {
-    pub(crate) fn resolve(&self) -> Result<Scenario, String> {
+    pub(crate) fn resolve(&self) -> Result<Scenario, Complaint> {
         let given = self.scenario;
         let steps = given.steps.map_or(Ok(defaults::STEPS), |steps| {
             at("scenario.steps", check::count(steps, 1, MOST_STEPS)).map(|steps| steps as u64)
         })?;
         let seed = given.seed.map_or(Ok(defaults::SEED), |seed| {
-            u64::try_from(seed)
-                .map_err(|_| format!("scenario.seed is {seed}: give a whole number, 0 or more"))
+            at("scenario.seed", check::seed(seed))
         })?;
         let (outputs, disturbances) = (self.dims.outputs, self.dims.disturbances);
         let schedule = self.schedule()?;
         let first = schedule[0].mode;
         let noise = self.noise()?;
-        let reference = self.channels("reference", &given.reference, self.tracked.len(), |at| {
+        let tracked = (self.tracked.len(), "tracked output");
+        let reference = self.channels("reference", &given.reference, tracked, |at| {
             self.step(at, first, steps)
         })?;
         let mut scenario = Scenario::new(steps, reference, self.dims);
         scenario.noise = noise;
         scenario.seed = seed;
-        scenario.fault = self.channels("fault", &given.fault, outputs, |_| Waveform::ZERO)?;
-        scenario.disturbance =
-            self.channels("disturbance", &given.disturbance, disturbances, |at| {
-                self.expected_disturbance(at)
-            })?;
+        scenario.fault = self.channels("fault", &given.fault, (outputs, "output"), |_| {
+            Waveform::ZERO
+        })?;
+        scenario.disturbance = self.channels(
+            "disturbance",
+            &given.disturbance,
+            (disturbances, "disturbance"),
+            |at| self.expected_disturbance(at),
+        )?;
         scenario.events = self.events()?;
         scenario.schedule = schedule;
         Ok(scenario)
     }
 
-    fn noise(&self) -> Result<Vec<f64>, String> {
+    fn noise(&self) -> Result<Vec<f64>, Complaint> {
         let outputs = self.dims.outputs;
         let Some(given) = &self.scenario.noise else {
             return Ok(vec![0.0; outputs]);
@@ -65,30 +71,34 @@ impl ScenarioContext<'_> {
         Ok(noise)
     }
 
-    fn schedule(&self) -> Result<Vec<ModeInterval>, String> {
+    fn schedule(&self) -> Result<Vec<ModeInterval>, Complaint> {
         let whole = [schema::ModeInterval {
             from: 0.0,
             mode: Which::Number(1),
         }];
         let given = self.scenario.schedule.as_deref().unwrap_or(&whole);
         if given.first().is_none_or(|interval| interval.from != 0.0) {
-            return Err(
-                "scenario.schedule must start at time 0: let its first entry say from = 0".into(),
-            );
+            return Err(Complaint::of(
+                "scenario.schedule",
+                "must start at time 0: let its first entry say from = 0",
+            ));
         }
         let ascending =
             |pair: &[schema::ModeInterval]| pair[0].from < pair[1].from && pair[1].from.is_finite();
         if let Some(pair) = given.windows(2).find(|pair| !ascending(pair)) {
-            return Err(format!(
-                "scenario.schedule goes from time {} to {}: give the times in ascending order",
-                pair[0].from, pair[1].from
+            return Err(Complaint::of(
+                "scenario.schedule",
+                format!(
+                    "goes from time {} to {}: give the times in ascending order",
+                    pair[0].from, pair[1].from
+                ),
             ));
         }
         let names = mode_names(self.plant);
         let resolve = |(entry, interval): (usize, &schema::ModeInterval)| {
-            let key = format!("scenario.schedule[{}]", entry + 1);
-            let what = format!("{key}.mode");
-            let mode = interval.mode.index(&what, &names, "modes")?;
+            let key = Key::from("scenario.schedule").entry(entry);
+            let mode = interval.mode.index(&names, "modes");
+            let mode = at(key.clone().then("mode"), mode)?;
             self.warn_beyond_the_end(&key, interval.from);
             Ok(ModeInterval {
                 from: interval.from,
@@ -100,36 +110,39 @@ impl ScenarioContext<'_> {
 
     fn channels(
         &self,
-        key: &str,
+        name: &str,
         given: &Option<Vec<SignalOverTime>>,
-        size: usize,
+        (size, channel): (usize, &str),
         default: impl Fn(usize) -> Waveform,
-    ) -> Result<Vec<Waveform>, String> {
+    ) -> Result<Vec<Waveform>, Complaint> {
+        let key = Key::from("scenario").then(name);
         let Some(given) = given else {
             return Ok((0..size).map(default).collect());
         };
         if given.len() != size {
-            return Err(format!(
-                "scenario.{key} has {} signals: give {size}, one per channel",
-                given.len()
+            return Err(Complaint::of(
+                key,
+                format!(
+                    "has {}: give {size}, one per {channel}",
+                    counted(given.len(), "signal", "signals")
+                ),
             ));
         }
         let waveform = |(index, signal): (usize, &SignalOverTime)| {
-            signal
-                .waveform(self.tables)
-                .map_err(|what| format!("scenario.{key}[{}]: {what}", index + 1))
+            let waveform = signal.waveform(self.tables);
+            waveform.map_err(|what| what.inside(key.clone().entry(index)))
         };
         given.iter().enumerate().map(waveform).collect()
     }
 
-    fn events(&self) -> Result<Vec<ftc_plant::scenario::FaultEvent>, String> {
+    fn events(&self) -> Result<Vec<ftc_plant::scenario::FaultEvent>, Complaint> {
         let events = self.scenario.events.iter().flatten().enumerate();
         let names = names(&self.signals.outputs);
         events
             .map(|(index, event)| {
-                let key = format!("scenario.events[{}]", index + 1);
+                let key = Key::from("scenario.events").entry(index);
                 let fault = event.fault(&names);
-                let fault = fault.map_err(|what| format!("{key}: {what}"))?;
+                let fault = fault.map_err(|what| what.inside(key.clone()))?;
                 self.warn_beyond_the_end(&key, fault.from);
                 Ok(fault)
             })
@@ -137,7 +150,7 @@ impl ScenarioContext<'_> {
     }
 
     /// Says of an entry that begins when the scenario is over that it never acts.
-    fn warn_beyond_the_end(&self, key: &str, from: f64) {
+    fn warn_beyond_the_end(&self, key: &Key, from: f64) {
         if from >= self.end {
             self.tables.notes.add(beyond_the_end(key, from, self.end));
         }

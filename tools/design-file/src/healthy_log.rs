@@ -6,6 +6,7 @@
 
 use crate::{check, notes::Notes, sentence, suggest, values::NameOrList};
 use ftc_design::commissioning::Database;
+use ftc_design::words::counted;
 use ftc_design::{Signal, Signals};
 use ftc_plant::{Mode, SwitchedPlant};
 use ftc_tables::{Clock, Place, Row as Cells, Table, TimeColumn, find_time_column};
@@ -48,7 +49,7 @@ impl Logs<'_> {
     /// The stretches of each mode: from one file with a `mode` column, or from one file per mode.
     ///
     /// # Errors
-    /// One sentence that names the file, the row and the column.
+    /// The end of a sentence that begins with the key: it names the file, the row and the column.
     pub(crate) fn read(&self, files: &NameOrList) -> Result<Vec<Vec<Database>>, String> {
         let modes = self.plant.modes.len();
         let mut stretches = vec![Vec::new(); modes];
@@ -56,8 +57,8 @@ impl Logs<'_> {
             NameOrList::Name(file) => self.add(file, None, &mut stretches)?,
             NameOrList::List(files) if files.len() != modes => {
                 return Err(format!(
-                    "lists {} logs: give one per mode, {modes}, or one file with a mode column",
-                    files.len()
+                    "lists {}: give one per mode, {modes}, or one file with a mode column",
+                    counted(files.len(), "log", "logs")
                 ));
             }
             NameOrList::List(files) => {
@@ -68,7 +69,8 @@ impl Logs<'_> {
         }
         match stretches.iter().position(Vec::is_empty) {
             Some(mode) => Err(format!(
-                "has no sample of mode {} ({}): record healthy operation in every mode",
+                ": {}: has no sample of mode {} ({}): record healthy operation in every mode",
+                sentence::shorten(files.of_mode(mode)),
                 mode + 1,
                 self.plant.modes[mode].name
             )),
@@ -91,7 +93,7 @@ impl Logs<'_> {
             };
             if let Some(output) = (0..outputs.len()).find(still) {
                 return Err(format!(
-                    "{}: mode {} ({}): {} never changes: record with a sensor that works",
+                    ": {}: mode {} ({}): {} never changes: record with a sensor that works",
                     sentence::shorten(files.of_mode(mode)),
                     mode + 1,
                     self.plant.modes[mode].name,
@@ -111,7 +113,7 @@ impl Logs<'_> {
     ) -> Result<(), String> {
         let rows = self
             .rows(&self.folder.join(file), only)
-            .map_err(|what| format!("{}: {what}", sentence::shorten(file)))?;
+            .map_err(|what| format!(": {}: {what}", sentence::shorten(file)))?;
         let mut first = 0;
         for stretch in rows.chunk_by(|one, next| one.mode == next.mode) {
             let mode = stretch[0].mode;
@@ -177,6 +179,14 @@ impl Logs<'_> {
         );
         // A signal that is called t or mode keeps its column.
         let taken: Vec<usize> = inputs.iter().chain(&outputs).copied().collect();
+        if let Some(at) = (1..taken.len()).find(|&at| taken[..at].contains(&taken[at])) {
+            let name = names[taken[at]];
+            return Err(format!(
+                "its column {name} is that of two signals: give every one of signals.inputs and signals.outputs a name of \
+                 its own"
+            )
+            .into());
+        }
         let mode = once(&names, "mode")?.filter(|at| !taken.contains(at));
         Ok(Columns {
             time: find_time_column(header, self.time, &taken)?,
@@ -246,9 +256,9 @@ fn column(names: &[&str], name: &str, number: &str, known: &[&str]) -> Result<us
         .copied()
         .filter(|name| !known.contains(name))
         .collect();
-    let advice = match free.is_empty() {
-        true => "add it".into(),
-        false => suggest::nearest(name, &free),
+    let advice = match suggest::similar(name, &free) {
+        Some(near) => format!("did you mean {near}?"),
+        None => "add it, or give the signal the name of its column in [signals]".into(),
     };
     Err(format!("has no column {wanted}: {advice}"))
 }

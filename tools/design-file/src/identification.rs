@@ -1,6 +1,7 @@
 //! From logs of healthy operation to the text of a design file.
 
 use crate::check::ValueError;
+pub use ftc_control::parameters::MOST_HARMONICS;
 use ftc_identify::{Identified, IdentifiedMode, Log, Settings};
 use ftc_tables::{Clock, Table, find_time_column};
 use std::fmt::{self, Write};
@@ -93,8 +94,36 @@ pub enum Error {
         /// That of the others.
         others: f64,
     },
+    /// A log has another sample time than was asked for.
+    OtherSampleTime {
+        /// The log.
+        log: PathBuf,
+        /// Its sample time.
+        apart: f64,
+        /// The one asked for.
+        asked: f64,
+    },
+    /// A number that is asked for is out of its range.
+    Value {
+        /// Its key: `sample_time` or `period`.
+        key: &'static str,
+        /// Why not.
+        what: ValueError,
+    },
+    /// A column is named twice.
+    NamedTwice {
+        /// The key that names it last: `inputs` or `outputs`.
+        key: &'static str,
+        /// The column.
+        column: String,
+    },
     /// The logs hold too little.
-    Logs(ftc_identify::Error),
+    Logs {
+        /// The logs: all of them, or the one of the mode.
+        logs: Vec<PathBuf>,
+        /// Why nothing was found.
+        error: ftc_identify::Error,
+    },
 }
 
 impl Error {
@@ -137,9 +166,41 @@ impl Error {
                 "{}: its rows are {apart} s apart, not {others} s: give logs of one sample time",
                 log.display()
             ),
-            Self::Logs(error) => error.to_string(),
+            Self::OtherSampleTime { log, apart, asked } => format!(
+                "{}: its rows are {apart} s apart, but {} is {asked}: leave that out",
+                log.display(),
+                option("sample_time")
+            ),
+            Self::Value { key, what } => format!("{} {what}", option(key)),
+            Self::NamedTwice { key, column } => format!(
+                "{} names the column \"{column}\" once more: name each column once, as an input or as an output",
+                option(key)
+            ),
+            Self::Logs { logs, error } => match error {
+                ftc_identify::Error::NoState => {
+                    format!("{} is 0: give at least 1", option("order"))
+                }
+                ftc_identify::Error::Period(samples) => format!(
+                    "{}: its last harmonic lasts {samples:.4} samples and cannot be told from others: give a longer \
+                     period, or fewer {}",
+                    option("period"),
+                    option("harmonics")
+                ),
+                ftc_identify::Error::NoModel { order } => format!(
+                    "{}: no model of order {order} explains it: record a run in which every input moves more, or give \
+                     another {}",
+                    listed(logs),
+                    option("order")
+                ),
+                other => format!("{}: {other}", listed(logs)),
+            },
         }
     }
+}
+
+fn listed(logs: &[PathBuf]) -> String {
+    let names: Vec<String> = logs.iter().map(|log| log.display().to_string()).collect();
+    names.join(", ")
 }
 
 impl fmt::Display for Error {
@@ -165,6 +226,10 @@ struct Read {
 /// [`Error`]
 pub fn identify(asked: &Asked) -> Result<Found, Error> {
     let name = name_of(&asked.out)?;
+    for (key, value) in [("sample_time", asked.sample_time), ("period", asked.period)] {
+        let checked = value.map_or(Ok(()), crate::check::positive);
+        checked.map_err(|what| Error::Value { key, what })?;
+    }
     let files: Result<Vec<Read>, Error> = asked.logs.iter().map(|log| read(log, asked)).collect();
     let mut files = files?;
     let several = files.len() > 1 && files.iter().all(|file| !file.has_modes);
@@ -181,7 +246,17 @@ pub fn identify(asked: &Asked) -> Result<Found, Error> {
     if let Some(period) = asked.period {
         settings = settings.with_disturbance(period, asked.harmonics, sample_time);
     }
-    let identified = ftc_identify::identify(&logs, &settings).map_err(Error::Logs)?;
+    let identified = ftc_identify::identify(&logs, &settings).map_err(|error| {
+        use ftc_identify::Error::{NotFinite, Sizes, Still, TooShort};
+        let one = match &error {
+            Sizes { log, .. } | NotFinite { log, .. } => Some(log - 1),
+            TooShort { mode, .. } | Still { mode, .. } if several => Some(mode - 1),
+            _ => None,
+        };
+        let logs = one.and_then(|one| asked.logs.get(one..=one));
+        let logs = logs.unwrap_or(&asked.logs).to_vec();
+        Error::Logs { logs, error }
+    })?;
     Ok(Found {
         text: design_file(&name, sample_time, &identified, first, asked, several)?,
         identified,
@@ -205,6 +280,16 @@ fn read(path: &Path, asked: &Asked) -> Result<Read, Error> {
     let table = Table::open(path).map_err(unusable)?;
     let inputs = columns(path, table.names(), &asked.inputs, ("u", "inputs"))?;
     let outputs = columns(path, table.names(), &asked.outputs, ("y", "outputs"))?;
+    let all: Vec<usize> = inputs.iter().chain(&outputs).copied().collect();
+    if let Some(at) = (1..all.len()).find(|&at| all[..at].contains(&all[at])) {
+        let key = if at < inputs.len() {
+            "inputs"
+        } else {
+            "outputs"
+        };
+        let column = table.names()[all[at]].clone();
+        return Err(Error::NamedTwice { key, column });
+    }
     rows(table, &inputs, &outputs, asked.time.as_deref())
         .map_err(|what| Error::Log(path.into(), what))
 }
@@ -307,14 +392,19 @@ fn sample_time(asked: &Asked, files: &[Read]) -> Result<f64, Error> {
         file.sample_time
             .is_some_and(|other| (other - step).abs() > 0.01 * step)
     };
-    match files.iter().position(differs) {
-        Some(index) => Err(Error::SampleTimes {
-            log: asked.logs[index].clone(),
-            apart: files[index].sample_time.unwrap_or(step),
+    let Some(index) = files.iter().position(differs) else {
+        return Ok(step);
+    };
+    let log = asked.logs[index].clone();
+    let apart = files[index].sample_time.unwrap_or(step);
+    Err(match asked.sample_time {
+        Some(asked) => Error::OtherSampleTime { log, apart, asked },
+        None => Error::SampleTimes {
+            log,
+            apart,
             others: step,
-        }),
-        None => Ok(step),
-    }
+        },
+    })
 }
 
 /// The text of the design file.

@@ -27,6 +27,7 @@
 
 mod assemble;
 pub mod check;
+mod complaint;
 pub mod defaults;
 mod error;
 mod estimator;
@@ -46,6 +47,7 @@ mod true_plant;
 pub mod values;
 pub mod wording;
 
+pub use complaint::{Complaint, Key};
 pub use error::Error;
 use ftc_design::assembly::Request;
 use notes::Notes;
@@ -53,7 +55,6 @@ use schema::DesignFile;
 use std::io::Read;
 use std::path::Path;
 use toml::de::DeTable;
-use values::NameOrList;
 
 /// The largest design file that is read; long tables belong in CSV files.
 const LARGEST_FILE: u64 = 4 << 20;
@@ -89,7 +90,7 @@ pub fn parse(text: &str, folder: &Path) -> Result<Loaded, Error> {
     let file = deserialize(text)?;
     let notes = Notes::default();
     let request = assemble::request(&file, folder, &notes)
-        .map_err(|sentence| Error::of_request(text, sentence))?;
+        .map_err(|complaint| Error::of_request(text, &complaint))?;
     Ok(Loaded {
         file,
         request,
@@ -107,11 +108,7 @@ fn deserialize(text: &str) -> Result<DesignFile, Error> {
 /// Whether thresholds rest on nothing: no noise, no threshold and no log is given.
 pub fn noise_is_unknown(file: &DesignFile) -> bool {
     let estimator = &file.estimator;
-    let logs = match &estimator.database {
-        Some(NameOrList::Name(name)) => name != "commission" && name != "model",
-        Some(NameOrList::List(_)) => true,
-        None => false,
-    };
+    let logs = estimator.logs().is_some();
     let unknown = file.scenario.noise.is_none() && estimator.threshold.is_none() && !logs;
     unknown && estimator.method != Some(schema::EstimatorMethod::None)
 }

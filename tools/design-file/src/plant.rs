@@ -1,11 +1,13 @@
 //! The plant of a design file: its own matrices, those of a MATLAB or NumPy file, or a named model.
 
-use crate::assemble::{LARGEST_SIZE, at};
+use crate::assemble::LARGEST_SIZE;
 use crate::check::{self, ValueError};
+use crate::complaint::{Complaint, Key, at};
 use crate::notes::Notes;
 use crate::schema::{self, DesignFile, PlantModel};
 use crate::values::Matrix;
 use crate::wording;
+use ftc_design::words::counted;
 use ftc_plant::rows;
 use ftc_plant::{Dimensions, Mode, OperatingPoint, SwitchedPlant};
 use ftc_tables::matrices::Matrices;
@@ -28,37 +30,40 @@ impl Found {
         &self,
         file: &DesignFile,
         others: &Others,
-    ) -> Result<SwitchedPlant, String> {
+    ) -> Result<SwitchedPlant, Complaint> {
         let modes = others.modes;
         if modes.len() != self.given.len() {
-            return Err(format!(
-                "mode has {} entries: give one for each of the {} modes, empty where nothing differs",
-                modes.len(),
-                self.given.len()
+            return Err(Complaint::of(
+                "mode",
+                format!(
+                    "has {}: give one for each of the {} of the model, empty where nothing differs",
+                    counted(modes.len(), "entry", "entries"),
+                    counted(self.given.len(), "mode", "modes")
+                ),
             ));
         }
         let mut given = self.given.clone();
         for (index, (own, other)) in given.iter_mut().zip(modes).enumerate() {
-            let source = Source::of(other, others.folder).map_err(|what| in_mode(index, &what))?;
-            own.replace(&source).map_err(|what| in_mode(index, &what))?;
-            if others.continuous != is_continuous(file) {
-                complete(&source, own, others.continuous).map_err(|what| in_mode(index, &what))?;
-            }
+            let mut replace = || {
+                let source = Source::of(other, others.folder)?;
+                own.replace(&source)?;
+                match others.continuous == is_continuous(file) {
+                    true => Ok(()),
+                    false => complete(&source, own, others.continuous),
+                }
+            };
+            replace().map_err(in_mode(index))?;
         }
         let plant = assembled(file, &given)?;
-        if sized(&plant)? != sized(&assembled(file, &self.given)?)? {
-            return Err(
-                "the matrices have other sizes than those of the model: keep to them".into(),
-            );
-        }
         if !others.continuous && plant.looks_continuous() {
             others.notes.add(looks_continuous("scenario.plant."));
         }
         let found = sampled_and_extended(file, plant, given, others.continuous)?;
         if found.held_inputs != self.held_inputs {
-            return Err(
-                "D is that of the true plant alone: give the modes of the model one too".into(),
-            );
+            return Err(Complaint::of(
+                "mode",
+                "has a D, but the model has none: give the modes of the model one too",
+            ));
         }
         Ok(found.plant)
     }
@@ -79,13 +84,16 @@ pub(crate) fn is_continuous(file: &DesignFile) -> bool {
 }
 
 /// Refuses a mode that leaves to the model what the model says about the other kind of time.
-fn complete(source: &Source, own: &Given, continuous: bool) -> Result<(), String> {
+fn complete(source: &Source, own: &Given, continuous: bool) -> Result<(), Complaint> {
     let disturbed = own.mode.e.ncols() > 0;
     for (name, needed) in [("A", true), ("B", true), ("E", disturbed)] {
         if needed && source.optional(name)?.is_none() {
-            return Err(format!(
-                "{name} is missing: with continuous = {continuous} it cannot be taken from the model, whose matrices are \
-                 not: add it"
+            return Err(Complaint::of(
+                name,
+                format!(
+                    "is missing: with continuous = {continuous} it cannot be taken from the model, whose matrices are \
+                     not: add it"
+                ),
             ));
         }
     }
@@ -112,21 +120,21 @@ struct Given {
 /// Reads the plant; other files are sought in `folder`.
 ///
 /// # Errors
-/// One sentence that names the key and what to do.
-pub(crate) fn read(file: &DesignFile, folder: &Path, notes: &Notes) -> Result<Found, String> {
+/// What is wrong with which key, and what to do.
+pub(crate) fn read(file: &DesignFile, folder: &Path, notes: &Notes) -> Result<Found, Complaint> {
     at("sample_time", check::positive(file.sample_time))?;
     let modes = match (&file.plant, file.modes.is_empty()) {
         (Some(model), true) => return named(model, file),
         (Some(_), false) => {
-            return Err(
-                "[plant] and [[mode]] exclude each other: a named model brings its own modes"
-                    .into(),
-            );
+            return Err(Complaint::general(
+                "[plant] and [[mode]] exclude each other: a named model brings its own modes, so leave one of them out",
+            ));
         }
         (None, true) => {
-            return Err(
-                "mode is missing: add at least one [[mode]], or a [plant] with a model".into(),
-            );
+            return Err(Complaint::of(
+                "mode",
+                "is missing: add at least one [[mode]], or a [plant] with a model",
+            ));
         }
         (None, false) => given_modes(file, folder)?,
     };
@@ -139,7 +147,7 @@ pub(crate) fn read(file: &DesignFile, folder: &Path, notes: &Notes) -> Result<Fo
 }
 
 /// The modes as one plant, as it stands in the file.
-fn assembled(file: &DesignFile, modes: &[Given]) -> Result<SwitchedPlant, String> {
+fn assembled(file: &DesignFile, modes: &[Given]) -> Result<SwitchedPlant, Complaint> {
     let plant = SwitchedPlant::new(
         file.sample_time,
         modes.iter().map(|given| given.mode.clone()).collect(),
@@ -153,7 +161,7 @@ fn sampled_and_extended(
     mut plant: SwitchedPlant,
     given: Vec<Given>,
     continuous: bool,
-) -> Result<Found, String> {
+) -> Result<Found, Complaint> {
     if continuous {
         sample(&mut plant)?;
     }
@@ -161,12 +169,12 @@ fn sampled_and_extended(
 }
 
 /// A named model, which is sampled and has no feedthrough.
-fn named(model: &PlantModel, file: &DesignFile) -> Result<Found, String> {
+fn named(model: &PlantModel, file: &DesignFile) -> Result<Found, Complaint> {
     if file.continuous.is_some() {
-        return Err(
-            "continuous belongs to [[mode]]: leave it out beside [plant], which is sampled anyway"
-                .into(),
-        );
+        return Err(Complaint::of(
+            "continuous",
+            "belongs to [[mode]]: leave it out beside [plant], which is sampled anyway",
+        ));
     }
     let plant = linearised(model, file.sample_time)?;
     check_magnitudes(&plant, sized(&plant)?)?;
@@ -178,16 +186,18 @@ fn named(model: &PlantModel, file: &DesignFile) -> Result<Found, String> {
 }
 
 /// Samples every mode of a continuous plant.
-fn sample(plant: &mut SwitchedPlant) -> Result<(), String> {
+fn sample(plant: &mut SwitchedPlant) -> Result<(), Complaint> {
     let step = plant.sample_time;
     for (index, mode) in plant.modes.iter_mut().enumerate() {
         *mode = mode.sampled(step);
         let sound = |matrix: &DMatrix<f64>| matrix.iter().all(|&v| check::number(v).is_ok());
         if !(sound(&mode.a) && sound(&mode.b) && sound(&mode.e)) {
-            return Err(format!(
-                "mode {}: A grows beyond all bounds within sample_time = {step} s: \
-                 give a shorter sample_time, or check the units of A",
-                index + 1
+            return Err(Complaint::of(
+                Key::mode(index).then("A"),
+                format!(
+                    "grows beyond all bounds within sample_time = {step} s: give a shorter sample_time, or check the \
+                     units of A"
+                ),
             ));
         }
     }
@@ -195,7 +205,7 @@ fn sample(plant: &mut SwitchedPlant) -> Result<(), String> {
 }
 
 /// Makes states of inputs that act on outputs directly.
-fn extend(mut plant: SwitchedPlant, given: Vec<Given>, latency: i64) -> Result<Found, String> {
+fn extend(mut plant: SwitchedPlant, given: Vec<Given>, latency: i64) -> Result<Found, Complaint> {
     let Some(first) = given.iter().position(|mode| mode.feedthrough.is_some()) else {
         return Ok(Found {
             plant,
@@ -204,10 +214,10 @@ fn extend(mut plant: SwitchedPlant, given: Vec<Given>, latency: i64) -> Result<F
         });
     };
     if latency == 0 {
-        return Err(format!(
-            "mode {}: D is not zero, so with controller.latency = 0 a command would act on the very reading that it is \
-             computed from: set controller.latency = 1, or leave D out if it may be neglected",
-            first + 1
+        return Err(Complaint::of(
+            Key::mode(first).then("D"),
+            "is not zero, so with controller.latency = 0 a command would act on the very reading that it is computed \
+             from: set controller.latency = 1, or leave D out if it may be neglected",
         ));
     }
     let Dimensions {
@@ -217,11 +227,13 @@ fn extend(mut plant: SwitchedPlant, given: Vec<Given>, latency: i64) -> Result<F
         let none = DMatrix::zeros(outputs, inputs);
         let feedthrough = given.feedthrough.as_ref().unwrap_or(&none);
         if feedthrough.shape() != (outputs, inputs) {
-            return Err(format!(
-                "mode {}: D is {} x {}, but with C and B it has to be {outputs} x {inputs}",
-                index + 1,
-                feedthrough.nrows(),
-                feedthrough.ncols()
+            return Err(Complaint::of(
+                Key::mode(index).then("D"),
+                format!(
+                    "is {} x {}, but with C and B it has to be {outputs} x {inputs}: give it that size",
+                    feedthrough.nrows(),
+                    feedthrough.ncols()
+                ),
             ));
         }
         *mode = mode.with_feedthrough(feedthrough);
@@ -234,18 +246,21 @@ fn extend(mut plant: SwitchedPlant, given: Vec<Given>, latency: i64) -> Result<F
     })
 }
 
-fn given_modes(file: &DesignFile, folder: &Path) -> Result<Vec<Given>, String> {
+fn given_modes(file: &DesignFile, folder: &Path) -> Result<Vec<Given>, Complaint> {
     if file.modes.len() > LARGEST_SIZE {
-        return Err(format!(
-            "mode: there are {} modes: give at most {LARGEST_SIZE}",
-            file.modes.len()
+        return Err(Complaint::of(
+            "mode",
+            format!(
+                ": there are {} modes: give at most {LARGEST_SIZE}",
+                file.modes.len()
+            ),
         ));
     }
-    let sources: Result<Vec<Source>, String> = file
+    let sources: Result<Vec<Source>, Complaint> = file
         .modes
         .iter()
         .enumerate()
-        .map(|(index, mode)| Source::of(mode, folder).map_err(|what| in_mode(index, &what)))
+        .map(|(index, mode)| Source::of(mode, folder).map_err(in_mode(index)))
         .collect();
     let sources = sources?;
     let width = |source: &Source| {
@@ -256,14 +271,13 @@ fn given_modes(file: &DesignFile, folder: &Path) -> Result<Vec<Given>, String> {
     sources
         .iter()
         .enumerate()
-        .map(|(index, source)| {
-            mode(source, index + 1, disturbances).map_err(|what| in_mode(index, &what))
-        })
+        .map(|(index, source)| mode(source, index + 1, disturbances).map_err(in_mode(index)))
         .collect()
 }
 
-fn in_mode(index: usize, what: &str) -> String {
-    format!("mode {}: {what}", index + 1)
+/// Says of a complaint in which mode it is.
+fn in_mode(index: usize) -> impl Fn(Complaint) -> Complaint {
+    move |what| what.inside(Key::mode(index))
 }
 
 /// Where the matrices of one mode come from.
@@ -274,15 +288,18 @@ struct Source<'a> {
 }
 
 impl<'a> Source<'a> {
-    fn of(given: &'a schema::Mode, folder: &Path) -> Result<Self, String> {
+    fn of(given: &'a schema::Mode, folder: &Path) -> Result<Self, Complaint> {
         let file = given.file.as_deref();
         if file.is_none() && given.structure.is_some() {
-            return Err("struct names a structure in a file: give file as well".into());
+            return Err(Complaint::of(
+                "struct",
+                "names a structure in a file: give file as well",
+            ));
         }
         let read = |name: &'a str| {
             let found = Matrices::read(&folder.join(name))
-                .map_err(|what| format!("file = \"{name}\" {what}"))?;
-            Ok::<_, String>((name, found))
+                .map_err(|what| Complaint::of("file", format!("= \"{name}\" {what}")))?;
+            Ok::<_, Complaint>((name, found))
         };
         Ok(Self {
             given,
@@ -304,31 +321,38 @@ impl<'a> Source<'a> {
     }
 
     /// A matrix that there has to be.
-    fn required(&self, name: &str) -> Result<DMatrix<f64>, String> {
+    fn required(&self, name: &str) -> Result<DMatrix<f64>, Complaint> {
         match (self.optional(name)?, &self.file) {
             (Some(matrix), _) => Ok(matrix),
-            (None, None) => Err(format!(
-                "{name} is missing: add it, or a file that holds it"
+            (None, None) => Err(Complaint::of(
+                name,
+                "is missing: add it, or a file that holds it",
             )),
             (None, Some((file, found))) => {
                 let names: Vec<&str> = found.names().collect();
-                Err(format!(
-                    "{name} is missing: file = \"{file}\" has no variable {}: say which of its variables it is, \
-                     {name} = \"...\", out of {}",
-                    self.path(name),
-                    names.join(", ")
+                Err(Complaint::of(
+                    name,
+                    format!(
+                        "is missing: file = \"{file}\" has no variable {}: say which of its variables it is, \
+                         {name} = \"...\", out of {}",
+                        self.path(name),
+                        names.join(", ")
+                    ),
                 ))
             }
         }
     }
 
     /// A matrix that may be absent.
-    fn optional(&self, name: &str) -> Result<Option<DMatrix<f64>>, String> {
+    fn optional(&self, name: &str) -> Result<Option<DMatrix<f64>>, Complaint> {
         match (self.said(name), &self.file) {
             (Some(Matrix::Rows(rows)), _) => matrix(name, rows).map(Some),
-            (Some(Matrix::Name(variable)), None) => Err(format!(
-                "{name} = \"{}\" names a variable, but there is no file: add file = \"...\", or give {name} as a list of rows",
-                crate::sentence::shorten(variable)
+            (Some(Matrix::Name(variable)), None) => Err(Complaint::of(
+                name,
+                format!(
+                    "= \"{}\" names a variable, but there is no file: add file = \"...\", or give {name} as a list of rows",
+                    crate::sentence::shorten(variable)
+                ),
             )),
             (Some(Matrix::Name(variable)), Some((file, found))) => {
                 let path = self.path(variable);
@@ -379,14 +403,20 @@ impl<'a> Source<'a> {
 }
 
 /// The matrix of that name in the file, finite.
-fn read_matrix(file: &str, found: &Matrices, name: &str) -> Result<DMatrix<f64>, String> {
+fn read_matrix(file: &str, found: &Matrices, name: &str) -> Result<DMatrix<f64>, Complaint> {
     let matrix = found
         .matrix(name)
-        .map_err(|what| format!("file = \"{file}\" {what}"))?;
-    sound(&format!("file = \"{file}\": {name}"), matrix)
+        .map_err(|what| Complaint::of("file", format!("= \"{file}\" {what}")))?;
+    match unsound(&matrix) {
+        Some(what) => Err(Complaint::of(
+            "file",
+            format!("= \"{file}\": {name}: {what}"),
+        )),
+        None => Ok(matrix),
+    }
 }
 
-fn mode(source: &Source, number: usize, disturbances: usize) -> Result<Given, String> {
+fn mode(source: &Source, number: usize, disturbances: usize) -> Result<Given, Complaint> {
     let (a, b, c) = (
         source.required("A")?,
         source.required("B")?,
@@ -395,7 +425,7 @@ fn mode(source: &Source, number: usize, disturbances: usize) -> Result<Given, St
     let (n, p) = (a.nrows(), c.nrows());
     let channel = |name: &str, height: usize| {
         let given = source.optional(name)?;
-        Ok::<_, String>(given.unwrap_or_else(|| DMatrix::zeros(height, disturbances)))
+        Ok::<_, Complaint>(given.unwrap_or_else(|| DMatrix::zeros(height, disturbances)))
     };
     let operating_point = match &source.given.operating_point {
         Some(point) => OperatingPoint {
@@ -412,9 +442,10 @@ fn mode(source: &Source, number: usize, disturbances: usize) -> Result<Given, St
         .as_deref()
         .is_some_and(|name| !check::printable(name))
     {
-        return Err(
-            "name has a character that is not printable: give the mode another name".into(),
-        );
+        return Err(Complaint::of(
+            "name",
+            "has a character that is not printable: give the mode another name",
+        ));
     }
     Ok(Given {
         mode: Mode::new(a, b, c)
@@ -433,7 +464,7 @@ fn mode(source: &Source, number: usize, disturbances: usize) -> Result<Given, St
 
 impl Given {
     /// Puts the matrices that `source` has in the place of these.
-    fn replace(&mut self, source: &Source) -> Result<(), String> {
+    fn replace(&mut self, source: &Source) -> Result<(), Complaint> {
         let mode = &mut self.mode;
         for (name, matrix) in [
             ("A", &mut mode.a),
@@ -443,6 +474,16 @@ impl Given {
             ("F", &mut mode.f),
         ] {
             if let Some(other) = source.optional(name)? {
+                let [(rows, columns), model] = [other.shape(), matrix.shape()];
+                if (rows, columns) != model {
+                    return Err(Complaint::of(
+                        name,
+                        format!(
+                            "is {rows} x {columns}, but that of the model is {} x {}: give it that size",
+                            model.0, model.1
+                        ),
+                    ));
+                }
                 *matrix = other;
             }
         }
@@ -450,34 +491,39 @@ impl Given {
             self.feedthrough = Some(other);
         }
         if source.given.operating_point.is_some() {
-            return Err("operating_point is that of the model: leave it out".into());
+            return Err(Complaint::of(
+                "operating_point",
+                "is that of the model: leave it out",
+            ));
         }
         Ok(())
     }
 }
 
-fn matrix(name: &str, given: &[Vec<f64>]) -> Result<DMatrix<f64>, String> {
+fn matrix(name: &str, given: &[Vec<f64>]) -> Result<DMatrix<f64>, Complaint> {
     let matrix = rows::from_rows(given)
-        .map_err(|what| format!("{name}: {what}: make all rows equally long"))?;
-    sound(name, matrix)
-}
-
-/// A matrix of finite numbers of allowed size.
-fn sound(name: &str, matrix: DMatrix<f64>) -> Result<DMatrix<f64>, String> {
-    let unsound = |&value: &f64| check::number(value).is_err();
-    match matrix.iter().position(unsound) {
-        Some(entry) => Err(format!(
-            "{name}: the entry in row {}, column {} {}",
-            entry % matrix.nrows() + 1,
-            entry / matrix.nrows() + 1,
-            ValueError::Number(matrix[entry])
-        )),
+        .map_err(|what| Complaint::of(name, format!(": {what}: make all rows equally long")))?;
+    match unsound(&matrix) {
+        Some(what) => Err(Complaint::of(name, format!(": {what}"))),
         None => Ok(matrix),
     }
 }
 
+/// The first entry that is infinite, no number or of impractical size, if there is one.
+fn unsound(matrix: &DMatrix<f64>) -> Option<String> {
+    let entry = matrix
+        .iter()
+        .position(|&value| check::number(value).is_err())?;
+    Some(format!(
+        "the entry in row {}, column {} {}",
+        entry % matrix.nrows() + 1,
+        entry / matrix.nrows() + 1,
+        ValueError::Number(matrix[entry])
+    ))
+}
+
 /// Refuses what no solver could finish.
-fn check_magnitudes(plant: &SwitchedPlant, dims: Dimensions) -> Result<(), String> {
+fn check_magnitudes(plant: &SwitchedPlant, dims: Dimensions) -> Result<(), Complaint> {
     let sizes = [
         ("states (rows of A)", dims.states),
         ("inputs (columns of B)", dims.inputs),
@@ -485,15 +531,16 @@ fn check_magnitudes(plant: &SwitchedPlant, dims: Dimensions) -> Result<(), Strin
         ("disturbances (columns of E and F)", dims.disturbances),
     ];
     if let Some((what, size)) = sizes.iter().find(|(_, size)| *size > LARGEST_SIZE) {
-        return Err(format!(
-            "mode 1: there are {size} {what}: reduce the model to at most {LARGEST_SIZE}"
+        return Err(Complaint::of(
+            Key::mode(0),
+            format!(": there are {size} {what}: reduce the model to at most {LARGEST_SIZE}"),
         ));
     }
     for (index, mode) in plant.modes.iter().enumerate() {
         let point = &mode.operating_point;
         for (name, values) in [("x", &point.x), ("u", &point.u), ("y", &point.y)] {
             at(
-                &format!("mode {}: operating_point.{name}", index + 1),
+                Key::mode(index).then("operating_point").then(name),
                 check::each(values, check::number),
             )?;
         }
@@ -502,7 +549,7 @@ fn check_magnitudes(plant: &SwitchedPlant, dims: Dimensions) -> Result<(), Strin
 }
 
 /// The modes of a named model: its linearisations.
-fn linearised(model: &PlantModel, sample_time: f64) -> Result<SwitchedPlant, String> {
+fn linearised(model: &PlantModel, sample_time: f64) -> Result<SwitchedPlant, Complaint> {
     let PlantModel::Rectifier(rectifier) = model;
     let values = [
         ("inductance", rectifier.inductance),
@@ -513,16 +560,19 @@ fn linearised(model: &PlantModel, sample_time: f64) -> Result<SwitchedPlant, Str
         ("dc_voltage", rectifier.dc_voltage),
     ];
     for (key, value) in values {
-        at(&format!("plant.{key}"), check::positive(value))?;
+        at(Key::from("plant").then(key), check::positive(value))?;
     }
     at(
         "plant.loads",
         check::each(&rectifier.loads, check::positive),
     )?;
     if rectifier.loads.is_empty() || rectifier.loads.len() > LARGEST_SIZE {
-        return Err(format!(
-            "plant.loads has {} entries: give 1 to {LARGEST_SIZE}, one per mode",
-            rectifier.loads.len()
+        return Err(Complaint::of(
+            "plant.loads",
+            format!(
+                "has {}: give 1 to {LARGEST_SIZE}, one per mode",
+                counted(rectifier.loads.len(), "entry", "entries")
+            ),
         ));
     }
     let linearised = rectifier.linearise(sample_time);
@@ -530,6 +580,6 @@ fn linearised(model: &PlantModel, sample_time: f64) -> Result<SwitchedPlant, Str
 }
 
 /// The sizes of a plant, or which matrix of which mode does not fit.
-fn sized(plant: &SwitchedPlant) -> Result<Dimensions, String> {
-    Dimensions::check(plant).map_err(|error| wording::of_plant(&error))
+fn sized(plant: &SwitchedPlant) -> Result<Dimensions, Complaint> {
+    Ok(Dimensions::check(plant)?)
 }

@@ -298,6 +298,23 @@ pub struct Estimator {
     pub input_load: Option<NumberOrList>,
 }
 
+/// The value of `estimator.database` for a commissioning run on the model.
+pub const COMMISSION: &str = "commission";
+/// The value of `estimator.database` for the model's own response.
+pub const MODEL: &str = "model";
+
+impl Estimator {
+    /// The logs that the database is taken from, if it is.
+    pub fn logs(&self) -> Option<&NameOrList> {
+        let kinds = [COMMISSION, MODEL];
+        let database = self.database.as_ref();
+        database.filter(|given| match given {
+            NameOrList::Name(name) => !kinds.contains(&name.as_str()),
+            NameOrList::List(_) => true,
+        })
+    }
+}
+
 /// Values of `estimator.mode`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
 #[serde(rename_all = "kebab-case")]

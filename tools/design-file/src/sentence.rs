@@ -1,8 +1,9 @@
 //! One sentence for whatever a parser complains about.
 
+use crate::complaint::{Complaint, Key};
 use crate::{Error, shape, suggest};
 use ftc_tables::QUOTATION;
-use serde_path_to_error::{Path, Segment};
+use serde_path_to_error::Path;
 
 /// Line and column of a byte of the text, from 1.
 pub fn place(text: &str, offset: usize) -> (usize, usize) {
@@ -56,75 +57,37 @@ pub(crate) fn mismatch(text: &str, path: &Path, error: &toml::de::Error) -> Erro
     let place_words = start.map(place_of).unwrap_or_default();
     let message = one_line(error.message());
     let quoted = quotations(&message);
-    let table = key(path);
-    let inside = |name: &str| {
-        let already = table.rsplit(['.', ' ']).next() == Some(name);
-        if already {
-            table.clone()
-        } else {
-            join(&table, name)
-        }
+    let table = Key::from(path);
+    let inside = |name: &str| match table.name() == Some(name) {
+        true => table.clone(),
+        false => table.clone().then(Key::of_name(name)),
     };
     let (key, what) = match (
         &quoted[..],
         message.split_once('`').map(|(head, _)| head.trim()),
     ) {
-        ([field], Some("missing field")) => (inside(field), " is missing: add it".into()),
+        ([field], Some("missing field")) => (inside(field), "is missing: add it".into()),
         ([field, known @ ..], Some("unknown field")) => (
             inside(&shorten(field)),
-            format!(" is not a known key: {}", suggest::nearest(field, known)),
+            format!("is not a known key: {}", suggest::nearest(field, known)),
         ),
         ([value, known @ ..], Some("unknown variant")) => {
             let known = suggest::nearest(value, known);
-            let what = format!(" = \"{}\" is not a known value: {known}", shorten(value));
+            let what = format!("= \"{}\" is not a known value: {known}", shorten(value));
             (table, what)
         }
         _ => {
-            let separator = match table.chars().last() {
-                None => "",
-                Some(':') => " ",
-                Some(_) => ": ",
-            };
-            let what = format!("{separator}{}: correct the value", plain_types(&message));
-            (table, what)
+            let what = plain_types(&message);
+            let colon = if table.is_empty() { "" } else { ": " };
+            (table, format!("{colon}{what}: correct the value"))
         }
     };
+    let complaint = Complaint::of(key, what);
     Error {
         line: start.map(|start| place(text, start).0),
-        key: (!key.is_empty()).then(|| key.clone()),
-        ..Error::of_file(format!("{place_words}{key}{what}"))
+        key: complaint.key().map(Key::to_string),
+        ..Error::of_file(format!("{place_words}{complaint}"))
     }
-}
-
-/// A path as the user counts: `mode[0].A[1]` is `mode 1: A[2]`.
-fn key(path: &Path) -> String {
-    let mut out = String::new();
-    let mut segments = path.iter().peekable();
-    while let Some(segment) = segments.next() {
-        match (segment, segments.peek()) {
-            (Segment::Map { key }, Some(Segment::Seq { index })) if key == "mode" => {
-                let table = if out.is_empty() { "" } else { ": " };
-                out = format!("{out}{table}mode {}:", index + 1);
-                segments.next();
-            }
-            (Segment::Map { key } | Segment::Enum { variant: key }, _) => {
-                out = join(&out, &shorten(key));
-            }
-            (Segment::Seq { index }, _) => out.push_str(&format!("[{}]", index + 1)),
-            (Segment::Unknown, _) => {}
-        }
-    }
-    out
-}
-
-/// A key inside a table.
-fn join(table: &str, key: &str) -> String {
-    let separator = match table.chars().last() {
-        None => "",
-        Some(':') => " ",
-        Some(_) => ".",
-    };
-    format!("{table}{separator}{key}")
 }
 
 /// The words a message puts between back-quotes.

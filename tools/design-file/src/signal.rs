@@ -1,6 +1,9 @@
 //! Signals over time, as the user writes them.
 
+use crate::check;
+use crate::complaint::{Complaint, Key, at};
 use crate::notes::Notes;
+use ftc_design::words::counted;
 use ftc_plant::scenario::Waveform;
 use ftc_tables::{Clock, Interpolation, Table, find_time_column, resample};
 use serde::de::value::MapAccessDeserializer;
@@ -24,7 +27,7 @@ enum Given {
 struct SignalTable {
     kind: Kind,
     value: Option<f64>,
-    points: Option<Vec<[f64; 2]>>,
+    points: Option<Vec<Vec<f64>>>,
     amplitude: Option<f64>,
     period: Option<f64>,
     phase: Option<f64>,
@@ -129,11 +132,11 @@ impl Signal {
     /// The waveform; tables are read from CSV files beside the design file.
     ///
     /// # Errors
-    /// One sentence, to be put after the signal's key.
-    pub(crate) fn waveform(&self, tables: Tables) -> Result<Waveform, String> {
+    /// What is wrong with which of its keys.
+    pub(crate) fn waveform(&self, tables: Tables) -> Result<Waveform, Complaint> {
         match &self.0 {
             Given::Number(value) => Ok(Waveform::Constant {
-                value: finite("value", *value)?,
+                value: at(Key::default(), check::number(*value).map(|()| *value))?,
             }),
             Given::Table(table) => {
                 let (name, keys) = table.kind.keys();
@@ -164,7 +167,7 @@ impl SignalTable {
         ]
     }
 
-    fn waveform(&self, tables: Tables) -> Result<Waveform, String> {
+    fn waveform(&self, tables: Tables) -> Result<Waveform, Complaint> {
         let needed = |key: &str, value: Option<f64>| finite(key, present(key, value)?);
         let or_zero = |key: &str, value: Option<f64>| finite(key, value.unwrap_or(0.0));
         let period = || positive("period", present("period", self.period)?);
@@ -173,7 +176,7 @@ impl SignalTable {
                 value: needed("value", self.value)?,
             },
             Kind::Steps => Waveform::Steps {
-                points: ascending(present("points", self.points.as_ref())?)?,
+                points: ascending(&pairs(present("points", self.points.as_ref())?)?)?,
             },
             Kind::Square => Waveform::Square {
                 amplitude: needed("amplitude", self.amplitude)?,
@@ -203,7 +206,9 @@ impl SignalTable {
                 let between = self.interpolation.unwrap_or_default();
                 let values = tables
                     .read(&path, column, self.time.as_deref(), between.into())
-                    .map_err(|what| format!("{}: {what}", path.display()))?;
+                    .map_err(|what| {
+                        Complaint::of("file", format!(": {}: {what}", path.display()))
+                    })?;
                 Waveform::Table { values }
             }
         })
@@ -211,69 +216,86 @@ impl SignalTable {
 }
 
 /// The value of a key that has to be there.
-pub(crate) fn present<T>(key: &str, value: Option<T>) -> Result<T, String> {
-    value.ok_or_else(|| format!("{key} is missing: add it"))
+pub(crate) fn present<T>(key: &str, value: Option<T>) -> Result<T, Complaint> {
+    value.ok_or_else(|| Complaint::of(key, "is missing: add it"))
 }
 
 /// Refuses a key that a kind does not have.
-pub(crate) fn only(kind: &str, known: &[&str], given: &[(&str, bool)]) -> Result<(), String> {
+pub(crate) fn only(kind: &str, known: &[&str], given: &[(&str, bool)]) -> Result<(), Complaint> {
     let mut strangers = given
         .iter()
         .filter(|(key, there)| *there && !known.contains(key));
     match strangers.next() {
         None => Ok(()),
-        Some((key, _)) if known.is_empty() => Err(format!(
-            "{key} says nothing about kind = \"{kind}\": leave it out"
+        Some((key, _)) if known.is_empty() => Err(Complaint::of(
+            *key,
+            format!("says nothing about kind = \"{kind}\": leave it out"),
         )),
-        Some((key, _)) => Err(format!(
-            "{key} says nothing about kind = \"{kind}\", which has {}: leave it out, or choose another kind",
-            known.join(", ")
+        Some((key, _)) => Err(Complaint::of(
+            *key,
+            format!(
+                "says nothing about kind = \"{kind}\", which has {}: leave it out, or choose another kind",
+                known.join(", ")
+            ),
         )),
     }
 }
 
-pub(crate) fn finite(key: &str, value: f64) -> Result<f64, String> {
-    crate::check::number(value)
-        .map(|()| value)
-        .map_err(|what| format!("{key} {what}"))
+pub(crate) fn finite(key: &str, value: f64) -> Result<f64, Complaint> {
+    at(key, check::number(value)).map(|()| value)
 }
 
-pub(crate) fn positive(key: &str, value: f64) -> Result<f64, String> {
-    crate::check::positive(value)
-        .map(|()| value)
-        .map_err(|what| format!("{key} {what}"))
+pub(crate) fn positive(key: &str, value: f64) -> Result<f64, Complaint> {
+    at(key, check::positive(value)).map(|()| value)
 }
 
-pub(crate) fn interval(from: f64, until: f64) -> Result<(), String> {
+pub(crate) fn interval(from: f64, until: f64) -> Result<(), Complaint> {
     if !(from.is_finite() && from >= 0.0) {
-        return Err(format!(
-            "from is {from}: give a time in seconds, 0 or later"
+        return Err(Complaint::of(
+            "from",
+            format!("is {from}: give a time in seconds, 0 or later"),
         ));
     }
     if !(until.is_finite() && until > from) {
-        return Err(format!(
-            "until is {until}: give a time in seconds after from = {from}, or leave until out"
+        return Err(Complaint::of(
+            "until",
+            format!("is {until}: give a time in seconds after from = {from}, or leave until out"),
         ));
     }
     Ok(())
 }
 
+/// The entries of a list of points, each a time and a value.
+fn pairs(points: &[Vec<f64>]) -> Result<Vec<[f64; 2]>, Complaint> {
+    let pair = |(index, point): (usize, &Vec<f64>)| {
+        <[f64; 2]>::try_from(point.as_slice()).map_err(|_| {
+            Complaint::of(
+                Key::from("points").entry(index),
+                format!(
+                    "has {}: give a pair, [time, value]",
+                    counted(point.len(), "number", "numbers")
+                ),
+            )
+        })
+    };
+    points.iter().enumerate().map(pair).collect()
+}
+
 /// The points of a step list, checked.
-fn ascending(points: &[[f64; 2]]) -> Result<Vec<[f64; 2]>, String> {
+fn ascending(points: &[[f64; 2]]) -> Result<Vec<[f64; 2]>, Complaint> {
+    let wrong = |what: String| Err(Complaint::of("points", what));
     if points.is_empty() {
-        return Err("points is empty: give at least one [time, value] pair".into());
+        return wrong("is empty: give at least one [time, value] pair".into());
     }
     for [time, value] in points {
         if !(time.is_finite() && *time >= 0.0) {
-            return Err(format!(
-                "points has the time {time}: give seconds, 0 or later"
-            ));
+            return wrong(format!("has the time {time}: give seconds, 0 or later"));
         }
         finite("points", *value)?;
     }
     match points.windows(2).find(|pair| pair[0][0] >= pair[1][0]) {
-        Some(pair) => Err(format!(
-            "points go from time {} to {}: give the times in ascending order",
+        Some(pair) => wrong(format!(
+            "goes from time {} to {}: give the times in ascending order",
             pair[0][0], pair[1][0]
         )),
         None => Ok(points.to_vec()),
@@ -303,7 +325,7 @@ impl Tables<'_> {
             if let Some(clock) = &mut clock {
                 clock.read(&mut table, &row)?;
             }
-            values.push(table.number(&row, at, |value| super::check::number(value).is_ok())?);
+            values.push(table.number(&row, at, |value| check::number(value).is_ok())?);
         }
         if values.is_empty() {
             return Err("has no rows: give at least one".into());

@@ -5,15 +5,19 @@ const SIMILAR: f64 = 0.7;
 
 /// Names the known word nearest to `word`, or lists the known ones if none is near.
 pub fn nearest(word: &str, known: &[&str]) -> String {
-    let lower = word.to_lowercase();
-    let similarity = |other: &&str| strsim::jaro_winkler(&lower, &other.to_lowercase());
-    let best = known
-        .iter()
-        .max_by(|a, b| similarity(a).total_cmp(&similarity(b)));
-    match best {
-        Some(best) if similarity(best) >= SIMILAR => format!("did you mean {best}?"),
-        _ => format!("use one of {}", known.join(", ")),
+    match similar(word, known) {
+        Some(best) => format!("did you mean {best}?"),
+        None => format!("use one of {}", known.join(", ")),
     }
+}
+
+/// The known word nearest to `word`, if any is near.
+pub fn similar<'a>(word: &str, known: &[&'a str]) -> Option<&'a str> {
+    let lower = word.to_lowercase();
+    let similarity = |other: &str| strsim::jaro_winkler(&lower, &other.to_lowercase());
+    let rated = known.iter().map(|other| (similarity(other), *other));
+    let best = rated.max_by(|(a, _), (b, _)| a.total_cmp(b))?;
+    (best.0 >= SIMILAR).then_some(best.1)
 }
 
 #[cfg(test)]

@@ -1,7 +1,8 @@
 //! `[scenario.plant]`: the plant that is simulated, where it is not the one that was designed for.
 
-use crate::assemble::{at, names};
+use crate::assemble::names;
 use crate::check;
+use crate::complaint::{Complaint, Key, at};
 use crate::defaults;
 use crate::notes::Notes;
 use crate::plant::{Found, Others, is_continuous};
@@ -24,7 +25,7 @@ pub(crate) fn true_plant(
     signals: &Signals,
     folder: &Path,
     notes: &Notes,
-) -> Result<TruePlant, String> {
+) -> Result<TruePlant, Complaint> {
     let nominal = match &file.plant {
         None => TruePlant::AsDesigned,
         Some(PlantModel::Rectifier(rectifier)) => TruePlant::Rectifier(rectifier.clone()),
@@ -36,7 +37,7 @@ pub(crate) fn true_plant(
     let end = end(file);
     let deviation = deviation(given, found, signals, &|key, from| {
         if from >= end {
-            notes.add(beyond_the_end(&format!("scenario.plant.{key}"), from, end));
+            notes.add(beyond_the_end(key, from, end));
         }
     })?;
     Ok(motion.with_deviation(deviation))
@@ -49,7 +50,7 @@ pub(crate) fn end(file: &DesignFile) -> f64 {
 }
 
 /// What is said of something that begins when the scenario is over.
-pub(crate) fn beyond_the_end(key: &str, from: f64, end: f64) -> String {
+pub(crate) fn beyond_the_end(key: &Key, from: f64, end: f64) -> String {
     format!(
         "{key}: it begins at {from} s, but the scenario ends at {end} s, so it never acts: raise scenario.steps, or let \
          it begin earlier"
@@ -64,22 +65,27 @@ fn motion(
     folder: &Path,
     notes: &Notes,
     nominal: TruePlant,
-) -> Result<TruePlant, String> {
+) -> Result<TruePlant, Complaint> {
     let error = given.relative_error.unwrap_or(0.0);
     at("scenario.plant.relative_error", check::fraction(error))?;
     if given.modes.is_none() && given.continuous.is_some() {
-        return Err(
-            "scenario.plant.continuous is about scenario.plant.mode, which is missing: leave it out"
-                .into(),
-        );
+        return Err(Complaint::of(
+            "scenario.plant.continuous",
+            "is about scenario.plant.mode, which is missing: leave it out",
+        ));
     }
     if given.modes.is_none() && error == 0.0 {
         return Ok(nominal);
     }
     if file.plant.is_some() {
-        return Err(
-            "scenario.plant.mode and relative_error change matrices, but [plant] has none: leave them out".into(),
-        );
+        let key = match given.modes {
+            Some(_) => "scenario.plant.mode",
+            None => "scenario.plant.relative_error",
+        };
+        return Err(Complaint::of(
+            key,
+            "changes matrices, but [plant] has none: leave it out",
+        ));
     }
     let mut plant = match &given.modes {
         None => found.plant.clone(),
@@ -93,13 +99,11 @@ fn motion(
                     notes,
                 },
             )
-            .map_err(|what| format!("scenario.plant: {what}"))?,
+            .map_err(|what| what.inside("scenario.plant"))?,
     };
     if error > 0.0 {
         let seed = given.seed.map_or(Ok(defaults::SEED), |seed| {
-            u64::try_from(seed).map_err(|_| {
-                format!("scenario.plant.seed is {seed}: give a whole number, 0 or more")
-            })
+            at("scenario.plant.seed", check::seed(seed))
         })?;
         plant = plant.perturbed(error, seed);
     }
@@ -110,8 +114,8 @@ fn deviation(
     given: &Given,
     found: &Found,
     signals: &Signals,
-    begins: &dyn Fn(&str, f64),
-) -> Result<Deviation, String> {
+    begins: &dyn Fn(&Key, f64),
+) -> Result<Deviation, Complaint> {
     let dims = found.plant.dimensions();
     let input_gain = match &given.input_gain {
         None => Vec::new(),
@@ -134,7 +138,7 @@ fn deviation(
         Ok(Told {
             from: told.from,
             until: told.until,
-            mode: told.mode.index("mode", &modes, "modes")?,
+            mode: at("mode", told.mode.index(&modes, "modes"))?,
         })
     });
     let names = Names::new(found, signals);
@@ -190,35 +194,39 @@ impl<'a> Names<'a> {
 fn each<T, U>(
     key: &str,
     given: &Option<Vec<T>>,
-    resolve: impl Fn(&T, &str) -> Result<U, String>,
-) -> Result<Vec<U>, String> {
+    resolve: impl Fn(&T, &Key) -> Result<U, Complaint>,
+) -> Result<Vec<U>, Complaint> {
     let entries = given.iter().flatten().enumerate();
     entries
         .map(|(index, entry)| {
-            let key = format!("{key}[{}]", index + 1);
-            resolve(entry, &key).map_err(|what| format!("scenario.plant.{key}: {what}"))
+            let key = Key::from("scenario.plant").then(key).entry(index);
+            resolve(entry, &key).map_err(|what| what.inside(key))
         })
         .collect()
 }
 
-fn load(given: &schema::Load, names: &Names) -> Result<Load, String> {
+fn load(given: &schema::Load, names: &Names) -> Result<Load, Complaint> {
     interval(given.from, given.until)?;
     let disturbances: Vec<&str> = names.disturbances.iter().map(AsRef::as_ref).collect();
-    let at = match (&given.input, &given.disturbance, &given.state) {
-        (Some(which), None, None) => Port::Input(which.index("input", &names.inputs, "inputs")?),
-        (None, Some(which), None) => {
-            Port::Disturbance(which.index("disturbance", &disturbances, "disturbances")?)
+    let port = match (&given.input, &given.disturbance, &given.state) {
+        (Some(which), None, None) => {
+            Port::Input(at("input", which.index(&names.inputs, "inputs"))?)
         }
-        (None, None, Some(which)) => Port::State(which.index("state", &names.states, "states")?),
+        (None, Some(which), None) => Port::Disturbance(at(
+            "disturbance",
+            which.index(&disturbances, "disturbances"),
+        )?),
+        (None, None, Some(which)) => {
+            Port::State(at("state", which.index(&names.states, "states"))?)
+        }
         _ => {
-            return Err(
-                "say where it acts: one of input, disturbance and state, with its number or its name"
-                    .into(),
-            );
+            return Err(Complaint::general(
+                "say where it acts: one of input, disturbance and state, with its number or its name",
+            ));
         }
     };
     Ok(Load {
-        at,
+        at: port,
         from: given.from,
         until: given.until,
         size: finite("size", given.size)?,

@@ -74,24 +74,21 @@ impl Which {
     /// Its index from 0 among things of these names.
     ///
     /// # Errors
-    /// A number or name of nothing, or a name of more than one; the sentence begins with `key`, and
-    /// `things` is what they are called.
-    pub fn index(&self, key: &str, names: &[&str], things: &str) -> Result<usize, ValueError> {
+    /// A number or name of nothing, or a name of more than one; `things` is what they are called.
+    pub fn index(&self, names: &[&str], things: &str) -> Result<usize, ValueError> {
         let name = match self {
-            Self::Number(number) => return check::index(key, *number, names.len(), things),
+            Self::Number(number) => return check::index(*number, names.len(), things),
             Self::Name(name) => name,
         };
         let mut places = (0..names.len()).filter(|&at| names[at] == name);
         match (places.next(), places.next()) {
             (Some(at), None) => Ok(at),
             (Some(_), Some(_)) => Err(ValueError::SharedName {
-                key: key.to_string(),
                 name: name.clone(),
                 things: things.to_string(),
                 total: names.len(),
             }),
             (None, _) => Err(ValueError::NoSuchName {
-                key: key.to_string(),
                 name: name.clone(),
                 things: things.to_string(),
                 advice: suggest::nearest(name, names),

@@ -2,7 +2,12 @@
 //!
 //! Sentences in which nothing of a design file is named are the library's own.
 
+use crate::check::ValueError;
+use crate::complaint::{Complaint, Key};
+use crate::sentence::shorten;
+use crate::values::NameOrList;
 use ftc_design::commissioning::{CommissioningError, LONGEST_RESPONSE};
+use ftc_design::spec::LARGEST;
 use ftc_design::work::{MOST_BYTES, TooLarge};
 use ftc_design::{
     Advice, DecayRate, DesignError, Infeasibility, Lyapunov, RequestError, SolverFailure,
@@ -23,7 +28,7 @@ use ftc_plant::rectifier::RectifierError;
 /// ```
 pub fn of_error(error: &DesignError) -> String {
     match error {
-        DesignError::Request(error) => of_request(error),
+        DesignError::Request(error) => of_request(error, None).to_string(),
         DesignError::Infeasible(error) => of_infeasibility(error),
         DesignError::Uncertified(error) => of_uncertified(error),
         DesignError::Solver(error) => match solver_remedy(*error) {
@@ -69,24 +74,74 @@ pub fn of_advice(advice: &Advice) -> String {
     }
 }
 
-/// What is wrong with a request, and which keys to change.
-pub fn of_request(error: &RequestError) -> String {
+/// What is wrong with a request, and which keys to change. `logs` are those that the design file names.
+pub fn of_request(error: &RequestError, logs: Option<&NameOrList>) -> Complaint {
+    let of_log = |mode: usize, what: &str| {
+        let log = logs.map_or("", |logs| logs.of_mode(mode - 1));
+        Complaint::of(
+            "estimator.database",
+            format!(": {}: mode {mode}: {what}", shorten(log)),
+        )
+    };
     match error {
         RequestError::Plant(error) => of_plant(error),
         RequestError::Spec(error) => of_spec(error),
         RequestError::Uncontrollable(error) => of_uncontrollable(error),
         RequestError::TooLarge(error) => of_too_large(error),
         RequestError::Commissioning(error) => of_commissioning(error),
-        RequestError::Database { mode, error } => {
-            format!("mode {mode}: {}", of_commissioning(error))
-        }
+        RequestError::Database { mode, error } => match logs {
+            Some(_) => of_log(*mode, &of_database(error)),
+            None => of_commissioning(error).inside(in_mode(*mode)),
+        },
         RequestError::ResponseLength {
             length,
             inputs,
             most,
-        } => format!(
-            "the response length is {length} samples, but with {inputs} inputs it must lie between 1 and {most}: \
-             set estimator.response_length, or choose a longer sample_time"
+        } => Complaint::of(
+            "estimator.response_length",
+            format!(
+                "is {length} samples, but with {} it must lie between 1 and {most}: set another, or choose a longer \
+                 sample_time",
+                words::counted(*inputs, "input", "inputs")
+            ),
+        ),
+        RequestError::ShortLog { mode, needed } => of_log(
+            *mode,
+            &format!(
+                "there are fewer than {} samples of this mode in stretches of at least {needed} without a gap: record \
+                 more of it",
+                4 * needed
+            ),
+        ),
+        RequestError::LateLog { mode } => of_log(
+            *mode,
+            "the inputs act one sample after the row they stand in: move them down by one row, or log what the plant is \
+             given, not the command",
+        ),
+        RequestError::LongLog {
+            mode,
+            samples,
+            most,
+        } => of_log(
+            *mode,
+            &format!(
+                "there are {samples} samples, more than are needed: shorten it to at most {most}"
+            ),
+        ),
+        RequestError::Excitation {
+            mode,
+            input,
+            name,
+            lag,
+            ratio,
+        } => of_log(
+            *mode,
+            &format!(
+                "input {input} ({name}) is excited too little {} back (1 : {:.0e} of the strongest direction): record a \
+                 run in which every input moves on its own",
+                words::counted(*lag, "sample", "samples"),
+                1.0 / ratio.max(f64::MIN_POSITIVE)
+            ),
         ),
         RequestError::OperatingInput {
             mode,
@@ -94,81 +149,112 @@ pub fn of_request(error: &RequestError) -> String {
             value,
             min,
             max,
-        } => format!(
-            "mode {mode}: operating_point.u has {value} at input {input}, which signals.inputs[{input}] limits to {}: give \
-             a point within the limits, or other limits",
-            words::interval(*min, *max)
+        } => Complaint::of(
+            in_mode(*mode).then("operating_point.u"),
+            format!(
+                "has {value} at input {input}, which signals.inputs[{input}] limits to {}: give a point within the \
+                 limits, or other limits",
+                words::interval(*min, *max)
+            ),
         ),
-        RequestError::Bumpless => {
-            "controller.bumpless = true cannot be proved for this design: set it to false, set another \
-             controller.decay, or controller.lyapunov = \"dwell\""
-                .into()
-        }
+        RequestError::Bumpless => Complaint::of(
+            "controller.bumpless",
+            "= true cannot be proved for this design: set it to false, set another controller.decay, or \
+             controller.lyapunov = \"dwell\"",
+        ),
         RequestError::HiddenDisturbance {
             mode,
             successor,
             seen,
             wanted,
-        } => {
-            let entering = words::entering(*mode, *successor);
+        } => Complaint::of(
+            "observer.kind",
             format!(
-                "no unknown input observer exists for mode {mode}{entering}: rank(C E) = {seen}, but rank(E) = {wanted}, \
-                 so part of the disturbance does not show in the outputs at once: set observer.kind = \"luenberger\" or \
-                 \"auto\", or use more sensors"
-            )
-        }
-        RequestError::NoDisturbance => {
-            "observer.kind = \"uio\" needs a disturbance on the state (E), but there is none: set it to \
-             \"luenberger\" or \"auto\""
-                .into()
-        }
+                "= \"uio\" has no solution for mode {mode}{}: rank(C E) = {seen}, but rank(E) = {wanted}, so part of the \
+                 disturbance does not show in the outputs at once: set observer.kind = \"luenberger\" or \"auto\", or use more \
+                 sensors",
+                words::entering(*mode, *successor)
+            ),
+        ),
+        RequestError::NoDisturbance => Complaint::of(
+            "observer.kind",
+            "= \"uio\" needs a disturbance on the state (E), but there is none: set it to \"luenberger\" or \"auto\"",
+        ),
         RequestError::Undetectable {
             mode,
             decay,
             magnitude,
             decoupled,
         } => of_undetectable(*mode, *decay, *magnitude, *decoupled),
-        other => other.to_string(),
+        other => Complaint::general(other.to_string()),
     }
 }
 
+/// The key of a mode that counts from 1.
+fn in_mode(number: usize) -> Key {
+    Key::mode(number.saturating_sub(1))
+}
+
 /// What is wrong with a plant.
-pub(crate) fn of_plant(error: &PlantError) -> String {
+pub(crate) fn of_plant(error: &PlantError) -> Complaint {
     match error {
-        PlantError::SampleTime(given) => {
-            format!("sample_time is {given}: give a positive number of seconds")
+        PlantError::SampleTime(given) => Complaint::of(
+            "sample_time",
+            format!("is {given}: give a positive number of seconds"),
+        ),
+        PlantError::Empty(what) => Complaint::of(
+            in_mode(1),
+            format!(": there are no {what}: give at least one"),
+        ),
+        PlantError::Shape { matrix, .. } => {
+            Complaint::of(in_mode(1).then(*matrix), error.misfit().unwrap_or_default())
         }
+        PlantError::OtherShape { mode, matrix, .. } => Complaint::of(
+            in_mode(*mode).then(*matrix),
+            error.misfit().unwrap_or_default(),
+        ),
         PlantError::OperatingPointLength {
             mode,
             part,
             found,
             needed,
-        } => format!(
-            "mode {mode}: operating_point.{part} has {found} entries: give the {needed} that the plant needs"
+        } => Complaint::of(
+            in_mode(*mode).then("operating_point").then(*part),
+            format!(
+                "has {}: give the {needed} that the plant needs",
+                words::counted(*found, "entry", "entries")
+            ),
         ),
-        PlantError::OperatingPointNotFinite { mode, part } => {
-            format!("mode {mode}: operating_point.{part} is not finite: give numbers")
-        }
-        other => other.to_string(),
+        PlantError::OperatingPointNotFinite { mode, part } => Complaint::of(
+            in_mode(*mode).then("operating_point").then(*part),
+            "is not finite: give numbers",
+        ),
+        other => Complaint::general(other.to_string()),
     }
 }
 
 /// Why a rectifier has no operating point.
-pub(crate) fn of_rectifier(error: &RectifierError) -> String {
+pub(crate) fn of_rectifier(error: &RectifierError) -> Complaint {
     match error {
-        RectifierError::DcVoltage { given, diodes } => format!(
-            "plant.dc_voltage is {given} V, but the diodes hold the link at sqrt(3) times plant.phase_voltage, \
-             {diodes:.1} V: give a dc_voltage above it"
+        RectifierError::DcVoltage { given, diodes } => Complaint::of(
+            "plant.dc_voltage",
+            format!(
+                "is {given} V, but the diodes hold the link at sqrt(3) times plant.phase_voltage, {diodes:.1} V: give a \
+                 dc_voltage above it"
+            ),
         ),
         RectifierError::Overload {
             mode,
             power,
             resistance,
-        } => format!(
-            "plant.loads[{mode}] is too small: in mode {mode} the grid cannot supply {power:.0} W through plant.resistance = \
-             {resistance} ohm: raise the load resistance"
+        } => Complaint::of(
+            Key::from("plant.loads").entry(mode - 1),
+            format!(
+                "is too small: in mode {mode} the grid cannot supply {power:.0} W through plant.resistance = \
+                 {resistance} ohm: raise the load resistance"
+            ),
         ),
-        other => format!("plant: {other}"),
+        other => Complaint::of("plant", format!(": {other}")),
     }
 }
 
@@ -213,29 +299,39 @@ fn solver_remedy(error: SolverFailure) -> Option<&'static str> {
     })
 }
 
-fn of_spec(error: &SpecError) -> String {
+/// What is wrong with what is asked of controller or observer.
+pub(crate) fn of_spec(error: &SpecError) -> Complaint {
     match error {
-        SpecError::NothingTracked => "controller.tracked is empty: name at least one output".into(),
-        SpecError::TooFewInputs { tracked, inputs } => format!(
-            "controller.tracked names {tracked} outputs, but the plant has {inputs} inputs: track at most as many \
-             outputs as there are inputs"
+        SpecError::NothingTracked => Complaint::of(
+            "controller.tracked",
+            "is empty: name at least one output, or count it from 1",
         ),
-        SpecError::UnknownOutput { output, outputs } => format!(
-            "controller.tracked names output {output}, but the plant has {outputs}: name one that it has"
-        ),
-        SpecError::TrackedTwice(output) => {
-            format!("controller.tracked names output {output} twice: name each output once")
-        }
-        SpecError::Latency(latency) => format!("controller.latency is {latency}: give 0 or 1"),
-        SpecError::Decay { of, decay } => {
+        SpecError::TooFewInputs { tracked, inputs } => Complaint::of(
+            "controller.tracked",
             format!(
-                "{} is {decay}: give a number above 0 and at most 1",
-                decay_key(*of)
-            )
+                "names {}, but the plant has {}: track at most as many outputs as there are inputs",
+                words::counted(*tracked, "output", "outputs"),
+                words::counted(*inputs, "input", "inputs")
+            ),
+        ),
+        SpecError::UnknownOutput { output, outputs } => Complaint::of(
+            "controller.tracked",
+            format!("names output {output}, but the plant has {outputs}: name one that it has"),
+        ),
+        SpecError::TrackedTwice(output) => Complaint::of(
+            "controller.tracked",
+            format!("names output {output} twice: name each output once"),
+        ),
+        SpecError::Latency(latency) => {
+            Complaint::of("controller.latency", format!("is {latency}: give 0 or 1"))
         }
-        SpecError::NoDwellTime(of) => format!(
-            "{} = 1 gives no finite dwell time: give a number below 1",
-            decay_key(*of)
+        SpecError::Decay { of, decay } => Complaint::of(
+            decay_key(*of),
+            format!("is {decay}: give a number above 0 and at most 1"),
+        ),
+        SpecError::NoDwellTime(of) => Complaint::of(
+            decay_key(*of),
+            "= 1 gives no finite dwell time: give a number below 1",
         ),
         SpecError::Harmonic {
             harmonic,
@@ -247,27 +343,30 @@ fn of_spec(error: &SpecError) -> String {
                 0 => String::new(),
                 count => format!(", set disturbance.harmonics = {count}"),
             };
-            format!(
-                "the internal model cannot hold harmonic {harmonic} of the disturbance, whose period is {samples:.6} \
-                 samples: choose a sample_time at which it lies between {shortest:.4} and {longest:.0} samples{fewer}, or \
-                 set controller.internal_model = false"
+            Complaint::of(
+                "controller.internal_model",
+                format!(
+                    "= true cannot hold harmonic {harmonic} of the disturbance, whose period is {samples:.6} samples: \
+                     choose a sample_time at which it lies between {shortest:.4} and {longest:.0} samples{fewer}, or set controller.internal_model = false"
+                ),
             )
         }
         SpecError::WeightCount {
             weight,
             found,
             needed,
-        } => format!(
-            "{} has {found} entries: give one number, or a list of {needed}",
-            weight_key(*weight)
+        } => Complaint::of(
+            weight_key(*weight),
+            ValueError::Entries {
+                found: *found,
+                needed: *needed,
+            },
         ),
-        SpecError::Weight(weight) => {
-            format!(
-                "{} must be finite and not negative: give 0 or a positive number",
-                weight_key(*weight)
-            )
-        }
-        other => other.to_string(),
+        SpecError::Weight { weight, value } => Complaint::of(
+            weight_key(*weight),
+            format!("has the value {value}: give 0 or a positive number up to {LARGEST:e}"),
+        ),
+        other => Complaint::general(other.to_string()),
     }
 }
 
@@ -287,7 +386,7 @@ pub fn weight_key(weight: Weight) -> &'static str {
     }
 }
 
-fn of_uncontrollable(error: &Uncontrollable) -> String {
+fn of_uncontrollable(error: &Uncontrollable) -> Complaint {
     match error {
         Uncontrollable::Eigenvalue {
             mode,
@@ -299,56 +398,101 @@ fn of_uncontrollable(error: &Uncontrollable) -> String {
                 above if above < 1.0 => format!(", or set controller.decay above {above:.4}"),
                 _ => String::new(),
             };
-            format!(
-                "mode {mode}: (A, B) is uncontrollable: no input moves its eigenvalue {} of magnitude {magnitude:.4}, \
-                 which decays more slowly than controller.decay = {decay}: add an input{slower}",
-                words::eigenvalue(*eigenvalue)
+            Complaint::of(
+                in_mode(*mode),
+                format!(
+                    ": (A, B) is uncontrollable: no input moves its eigenvalue {} of magnitude {magnitude:.4}, which \
+                     decays more slowly than controller.decay = {decay}: add an input{slower}",
+                    words::eigenvalue(*eigenvalue)
+                ),
             )
         }
-        Uncontrollable::Tracked { mode } => format!(
-            "mode {mode}: (A, B) cannot hold the tracked outputs at arbitrary values, the pair with integral action is \
-             uncontrollable: track fewer outputs in controller.tracked, or outputs on which the inputs act independently"
+        Uncontrollable::Tracked { mode } => Complaint::of(
+            in_mode(*mode),
+            ": (A, B) cannot hold the tracked outputs at arbitrary values, the pair with integral action is \
+             uncontrollable: track fewer outputs in controller.tracked, or outputs on which the inputs act independently",
         ),
-        Uncontrollable::Harmonic { mode, harmonic } => format!(
-            "mode {mode}: the inputs cannot move the tracked outputs at harmonic {harmonic} of the disturbance, so no \
-             internal model can reject it: set fewer disturbance.harmonics, track fewer outputs in controller.tracked, or \
-             set controller.internal_model = false"
+        Uncontrollable::Harmonic { mode, harmonic } => Complaint::of(
+            in_mode(*mode),
+            format!(
+                ": the inputs cannot move the tracked outputs at harmonic {harmonic} of the disturbance, so no internal \
+                 model can reject it: set fewer disturbance.harmonics, track fewer outputs in controller.tracked, or set \
+                 controller.internal_model = false"
+            ),
         ),
-        other => other.to_string(),
+        other => Complaint::general(other.to_string()),
     }
 }
 
-fn of_too_large(error: &TooLarge) -> String {
+fn of_too_large(error: &TooLarge) -> Complaint {
     let one_at_a_time = match error.lyapunov {
         Lyapunov::Dwell => "",
         Lyapunov::Common | Lyapunov::Switched => {
             ", or set controller.lyapunov = \"dwell\", which solves one mode at a time"
         }
     };
-    format!(
+    Complaint::general(format!(
         "the inequalities of this design would take about {:.0} GB of memory and {}, but at most {:.0} GB are taken: \
          reduce the number of states, inputs or modes{one_at_a_time}",
         error.work.bytes / 1e9,
         error.work.time(),
         MOST_BYTES / 1e9
-    )
+    ))
 }
 
-fn of_commissioning(error: &CommissioningError) -> String {
+fn of_commissioning(error: &CommissioningError) -> Complaint {
     match error {
-        CommissioningError::Unstable { mode, radius } => format!(
-            "mode {mode}: A has spectral radius {radius:.4}, but the estimator needs a stable mode (below 1): set \
-             estimator.method = \"observer\""
+        CommissioningError::Unstable { mode, radius } => Complaint::of(
+            in_mode(*mode).then("A"),
+            format!(
+                "has spectral radius {radius:.4}, but the estimator needs a stable mode (below 1): set \
+                 estimator.method = \"observer\""
+            ),
         ),
-        CommissioningError::SlowResponse { mode, radius } => format!(
-            "mode {mode}: the response is still felt after {LONGEST_RESPONSE} samples (spectral radius {radius:.6}): set \
-             estimator.method = \"observer\", or choose a longer sample_time for this loop"
+        CommissioningError::SlowResponse { mode, radius } => Complaint::of(
+            in_mode(*mode).then("A"),
+            format!(
+                ": the response is still felt after {LONGEST_RESPONSE} samples (spectral radius {radius:.6}): set \
+                 estimator.method = \"observer\", or choose a longer sample_time for this loop"
+            ),
         ),
+        other => Complaint::general(other.to_string()),
+    }
+}
+
+/// Why the log of a mode gives no predictor.
+fn of_database(error: &CommissioningError) -> String {
+    match error {
+        CommissioningError::TooFewSamples {
+            samples,
+            stretches,
+            response_length,
+            unknowns,
+            needed,
+        } => {
+            let found = words::counted(*samples, "sample", "samples");
+            let split = match stretches {
+                0 | 1 => String::new(),
+                count => format!(
+                    " in {count} stretches, each of which spends its first {response_length} on the past,"
+                ),
+            };
+            let few = if *samples == 1 { "is" } else { "are" };
+            format!(
+                "{found}{split} {few} too few to identify {unknowns} response coefficients: record at least {needed}, or \
+                 set a shorter estimator.response_length than {response_length}"
+            )
+        }
+        CommissioningError::NoExcitation => {
+            "every input stays at its operating point, which excites nothing: record a run in which every input moves on \
+             its own"
+                .into()
+        }
         other => other.to_string(),
     }
 }
 
-fn of_undetectable(mode: usize, decay: f64, magnitude: f64, decoupled: bool) -> String {
+fn of_undetectable(mode: usize, decay: f64, magnitude: f64, decoupled: bool) -> Complaint {
     let (which, whose) = match decoupled {
         true => ("observer of this kind", "(C, T A)"),
         false => ("observer", "A"),
@@ -362,9 +506,12 @@ fn of_undetectable(mode: usize, decay: f64, magnitude: f64, decoupled: bool) -> 
                 .into()
         }
     };
-    format!(
-        "no {which} reaches observer.decay = {decay} in mode {mode}: {whose} has an eigenvalue of magnitude \
-         {magnitude:.4} that the outputs do not show; {help}"
+    Complaint::of(
+        "observer.decay",
+        format!(
+            "= {decay} is reached by no {which} in mode {mode}: {whose} has an eigenvalue of magnitude {magnitude:.4} \
+             that the outputs do not show: {help}"
+        ),
     )
 }
 
@@ -494,8 +641,12 @@ mod tests {
                 &["controller.decay = 1"],
             ),
             (
-                SpecError::Weight(Weight::Integral).into(),
-                &["controller.integral_weight"],
+                SpecError::Weight {
+                    weight: Weight::Integral,
+                    value: -1.0,
+                }
+                .into(),
+                &["controller.integral_weight has the value -1"],
             ),
             (
                 SpecError::Harmonic {

@@ -32,8 +32,10 @@ pub enum Error {
         source: std::io::Error,
     },
     /// A key that signs or verifies.
-    #[error("{} {what}", file.display())]
+    #[error("{option} {} {what}", file.display())]
     Key {
+        /// The option that names it: `sign` or `key`.
+        option: &'static str,
         /// The key file.
         file: PathBuf,
         /// Why not.

@@ -69,10 +69,11 @@ impl SigningKey {
     /// [`Error::Key`] in one sentence.
     pub fn read(path: &Path) -> Result<Self, Error> {
         let refused = |what: String| Error::Key {
+            option: SIGN,
             file: path.into(),
             what,
         };
-        let text = text(path)?;
+        let text = text(path, SIGN)?;
         let held = SecretKeyBox::from_string(&text).map_err(|error| refused(no_key(&error)))?;
         let found = match (unprotected(&text), std::env::var(PASSWORD)) {
             (Some(key), _) => Ok(key),
@@ -118,6 +119,12 @@ impl fmt::Debug for SigningKey {
     }
 }
 
+/// The option that names a secret key.
+const SIGN: &str = "sign";
+
+/// The option that names a public key.
+const KEY: &str = "key";
+
 /// A key file is a few lines.
 const LARGEST_KEY: u64 = 1 << 20;
 
@@ -127,8 +134,9 @@ impl VerifyingKey {
     /// # Errors
     /// [`Error::Key`] in one sentence.
     pub fn read(path: &Path) -> Result<Self, Error> {
-        let found = PublicKeyBox::from_string(&text(path)?).and_then(PublicKey::from_box);
+        let found = PublicKeyBox::from_string(&text(path, KEY)?).and_then(PublicKey::from_box);
         let key = found.map_err(|error| Error::Key {
+            option: KEY,
             file: path.into(),
             what: no_key(&error),
         })?;
@@ -139,8 +147,9 @@ impl VerifyingKey {
     }
 }
 
-fn text(path: &Path) -> Result<String, Error> {
+fn text(path: &Path, option: &'static str) -> Result<String, Error> {
     let refused = |what: String| Error::Key {
+        option,
         file: path.into(),
         what,
     };

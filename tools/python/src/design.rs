@@ -44,6 +44,7 @@ pub fn solve(
     let author = called.map_or(Author::Package, Author::User);
     let loaded =
         design_file::parse(text, &folder).map_err(|error| errors::of_input(py, error, author))?;
+    let logs = loaded.file.estimator.logs().cloned();
     let what = || "solving for gains and certifying them".to_string();
     let made = wait(py, &what, listener.as_ref(), move || {
         let (request, source) = Source::split(loaded);
@@ -54,7 +55,7 @@ pub fn solve(
         Ok::<_, DesignError>(source.made(design))
     })?;
     made.map(|made| Design(Arc::new(made)))
-        .map_err(|error| errors::of_design(py, &error, text, author))
+        .map_err(|error| errors::of_design(py, &error, text, logs.as_ref(), author))
 }
 
 fn pool(py: Python<'_>, threads: usize) -> PyResult<rayon::ThreadPool> {

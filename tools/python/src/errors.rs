@@ -1,5 +1,6 @@
 //! Exceptions of `ftc_fmu.errors`, with the parts of their sentences.
 
+use design_file::values::NameOrList;
 use design_file::wording;
 use ftc_design::DesignError;
 use pyo3::prelude::*;
@@ -55,7 +56,15 @@ fn without_position(sentence: &str) -> &str {
 }
 
 /// There is no such controller.
-pub fn of_design(py: Python<'_>, error: &DesignError, text: &str, author: Author<'_>) -> PyErr {
+///
+/// `text` is that of the design file, `logs` are those that it names.
+pub fn of_design(
+    py: Python<'_>,
+    error: &DesignError,
+    text: &str,
+    logs: Option<&NameOrList>,
+    author: Author<'_>,
+) -> PyErr {
     let sentence = match author {
         Author::User(file) => format!("{file}: {}", wording::of_error(error)),
         Author::Package => wording::of_error(error),
@@ -66,7 +75,7 @@ pub fn of_design(py: Python<'_>, error: &DesignError, text: &str, author: Author
     match error {
         DesignError::Request(what) => of_input(
             py,
-            design_file::Error::of_request(text, wording::of_request(what)),
+            design_file::Error::of_request(text, &wording::of_request(what, logs)),
             author,
         ),
         DesignError::Infeasible(found) => {
@@ -90,7 +99,7 @@ pub fn of_package(py: Python<'_>, error: package::Error) -> PyErr {
     match error {
         package::Error::Unproved { .. } => make(py, "Unproved", (sentence,)),
         package::Error::Output(_) => make(py, "DesignFileError", (sentence, "out")),
-        package::Error::Key { .. } => make(py, "DesignFileError", (sentence, "key")),
+        package::Error::Key { option, .. } => make(py, "DesignFileError", (sentence, option)),
         package::Error::NoPlatform { .. } => make(py, "DesignFileError", (sentence, "platforms")),
         _ => make(py, "FtcError", (sentence,)),
     }

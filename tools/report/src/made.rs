@@ -3,6 +3,7 @@
 use crate::warnings;
 use design_file::Loaded;
 use design_file::schema::DesignFile;
+use design_file::values::NameOrList;
 use ftc_design::Design;
 use ftc_design::assembly::Request;
 use ftc_design::warnings::LoggedMovement;
@@ -44,6 +45,11 @@ impl Source {
             notes: loaded.notes,
         };
         (loaded.request, source)
+    }
+
+    /// The logs that the design file names, if it does.
+    pub fn logs(&self) -> Option<&NameOrList> {
+        self.file.estimator.logs()
     }
 
     /// The design that was made of it, with its warnings.

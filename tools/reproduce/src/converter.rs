@@ -9,7 +9,7 @@ mod page;
 
 use super::experiment::{self, OutputMerits, design, merits};
 use super::{Error, Findings, Progress};
-use ftc_baselines::predictive::{Predictive, PredictiveSpec};
+use ftc_baselines::predictive::{Predictive, PredictiveError, PredictiveSpec};
 use ftc_control::Controller;
 use ftc_design::Design;
 use ftc_plant::scenario::{FaultEvent, FaultKind};
@@ -21,7 +21,10 @@ use std::fmt::Write;
 /// The paper's Table 2: VAF in percent, proposed and predictive; for which fault is not said.
 const REPORTED: [f64; 2] = [98.39, 96.0];
 
-const EXAMPLE: &str = include_str!("../../../examples/converter.toml");
+const EXAMPLE: (&str, &str) = (
+    "examples/converter.toml",
+    include_str!("../../../examples/converter.toml"),
+);
 
 /// When the sensor is faulty, in seconds.
 const FAULTY: [f64; 2] = [5.0, 15.0];
@@ -147,7 +150,7 @@ impl Trial {
 /// Runs everything.
 pub fn run(progress: Progress) -> Result<Findings, Error> {
     progress("designing for the converter");
-    let design = design(experiment::request(EXAMPLE)?)?;
+    let design = design(experiment::request(EXAMPLE)?, "converter")?;
     progress("running the converter under every fault");
     let trials: Vec<Trial> = cases()
         .into_iter()
@@ -183,7 +186,13 @@ fn attempt(design: &Design, case: Case) -> Result<Trial, Error> {
     let trajectories = COMPARED
         .into_iter()
         .map(|variant| match variant {
-            Variant::Predictive => predict(design, &plant, HORIZON, INPUT_WEIGHT),
+            Variant::Predictive => {
+                let run = predict(design, &plant, HORIZON, INPUT_WEIGHT);
+                run.map_err(|error| Error::Baseline {
+                    case: format!("converter, {}", case.key),
+                    error,
+                })
+            }
             _ => Ok(simulate(&plant, &controller, variant)),
         })
         .collect::<Result<Vec<_>, Error>>()?;
@@ -212,7 +221,7 @@ fn predict(
     plant: &PlantSimulator,
     horizon: usize,
     input_weight: f64,
-) -> Result<Trajectory, Error> {
+) -> Result<Trajectory, PredictiveError> {
     let controller = &design.controller;
     let tracked = controller.feedback.tracked.clone();
     let mut spec = PredictiveSpec::new(&design.plant, tracked, design.scenario.noise.clone());

@@ -1,8 +1,8 @@
 //! What both experiments share: from an example to a design, from runs to numbers and curves.
 
 use crate::Error;
-use ftc_design::Design;
 use ftc_design::assembly::{Request, assemble};
+use ftc_design::{Design, DesignError};
 use ftc_simulate::Trajectory;
 use ftc_simulate::closed_loop::Record;
 use ftc_simulate::metrics::Merit;
@@ -11,15 +11,25 @@ use report::table::{Table, number};
 use serde::Serialize;
 use std::path::Path;
 
-/// The request of a design file that is part of this program.
-pub fn request(text: &str) -> Result<Request, Error> {
-    Ok(design_file::parse(text, Path::new(""))?.request)
+/// The request of the design file of this name that is part of this program.
+pub fn request((name, text): (&str, &str)) -> Result<Request, Error> {
+    let loaded = design_file::parse(text, Path::new(""));
+    Ok(loaded
+        .map_err(|error| error.in_file(Path::new(name)))?
+        .request)
 }
 
-/// The design.
-pub fn design(request: Request) -> Result<Design, Error> {
-    let name = request.name.clone();
-    assemble(request).map_err(|error| Error::Design { name, error })
+/// The design of a case.
+pub fn design(request: Request, case: &str) -> Result<Design, Error> {
+    assemble(request).map_err(in_case(case))
+}
+
+/// Says in which case there is no design.
+pub fn in_case(case: &str) -> impl Fn(DesignError) -> Error {
+    move |error| Error::Design {
+        case: case.into(),
+        error,
+    }
 }
 
 /// Figures of merit of one output of one run, as written to JSON and CSV.

@@ -19,6 +19,7 @@ mod converter;
 mod experiment;
 mod paper;
 
+use design_file::wording;
 use ftc_baselines::predictive::PredictiveError;
 use ftc_design::DesignError;
 use report::page::Page;
@@ -68,19 +69,21 @@ pub enum Error {
     #[error(transparent)]
     Example(#[from] design_file::Error),
     /// There is no such design, or none that can be certified.
-    #[error("{name}: {error}")]
+    #[error("{case}: {}", wording::of_error(error))]
     Design {
-        /// Name of the design.
-        name: String,
+        /// What was to be designed.
+        case: String,
         /// Why not.
         error: DesignError,
     },
-    /// A printed theorem, or a variant of the design, that cannot be solved.
-    #[error(transparent)]
-    Theorem(#[from] DesignError),
     /// The controller that is compared with.
-    #[error(transparent)]
-    Baseline(#[from] PredictiveError),
+    #[error("{case}: the predictive controller: {error}")]
+    Baseline {
+        /// In which case.
+        case: String,
+        /// Why there is none.
+        error: PredictiveError,
+    },
     /// A table that cannot be written.
     #[error(transparent)]
     Table(#[from] csv::Error),
@@ -106,4 +109,23 @@ pub fn run(experiment: Experiment, progress: Progress) -> Result<Reproduction, E
         ],
         summary: findings.summary,
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use ftc_design::RequestError;
+
+    #[test]
+    fn a_case_without_a_design_is_named_with_the_keys_to_change() {
+        let case = "paper, disturbance on the state, noise 0".to_string();
+        let error = RequestError::Bumpless.into();
+        let said = Error::Design { case, error }.to_string();
+        assert!(
+            said.starts_with(
+                "paper, disturbance on the state, noise 0: controller.bumpless = true"
+            ),
+            "{said}"
+        );
+    }
 }

@@ -21,12 +21,21 @@ use serde::Serialize;
 use serde_json::json;
 use std::fmt::Write;
 
-/// Where the disturbance enters, and the example that says so.
-const CHANNELS: [(&str, &str); 2] = [
-    ("state", include_str!("../../../examples/paper.toml")),
+/// Where the disturbance enters, and the example that says so: its file and text.
+const CHANNELS: [(&str, (&str, &str)); 2] = [
+    (
+        "state",
+        (
+            "examples/paper.toml",
+            include_str!("../../../examples/paper.toml"),
+        ),
+    ),
     (
         "output",
-        include_str!("../../../examples/paper_output.toml"),
+        (
+            "examples/paper_output.toml",
+            include_str!("../../../examples/paper_output.toml"),
+        ),
     ),
 ];
 
@@ -128,16 +137,19 @@ struct Designs {
 }
 
 impl Designs {
-    fn new(request: &Request) -> Result<Self, Error> {
+    fn new(request: &Request, case: &str) -> Result<Self, Error> {
         let mut additive = request.clone();
         additive.control.objective = Objective::Decay;
         additive.compensation = Compensation::Additive;
         let mut sliding = additive.clone();
         sliding.estimator.method = EstimatorMethod::Sliding;
         Ok(Self {
-            proposed: design(request.clone())?,
-            additive: design(additive)?,
-            sliding: design(sliding)?,
+            proposed: design(request.clone(), case)?,
+            additive: design(additive, &format!("{case}, additive control"))?,
+            sliding: design(
+                sliding,
+                &format!("{case}, additive control with the sliding window"),
+            )?,
         })
     }
 
@@ -243,7 +255,8 @@ pub fn run(progress: Progress) -> Result<Findings, Error> {
 
 impl Record {
     fn add(&mut self, channel: &'static str, noise: f64, request: &Request) -> Result<(), Error> {
-        let designs = Designs::new(request)?;
+        let case = format!("paper, disturbance on the {channel}, noise {noise}");
+        let designs = Designs::new(request, &case)?;
         for reference in REFERENCES {
             let signals = waveforms(reference, request);
             let trajectories = designs.run_all(&signals);

@@ -163,7 +163,7 @@ pub enum TimeError {
     /// A gap, a doubled row or a wrong rate.
     #[error(
         "{place}: {column} goes from {before} to {now}, but sample_time is {sample_time}: \
-         record without gaps, one row per sample{}{}",
+         record without gaps, one row per sample, or set sample_time to that of the log{}{}",
         coarse(*resolution, *sample_time),
         other_unit(column, now - before, *sample_time)
     )]

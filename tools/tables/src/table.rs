@@ -321,6 +321,8 @@ fn refuse_binary(head: &[u8]) -> Result<(), Error> {
     ];
     match kinds.iter().find(|(magic, _)| head.starts_with(magic)) {
         Some((_, kind)) => Err(Error::NotText(kind)),
+        // Text in UTF-16 has been decoded.
+        None if head.contains(&0) => Err(Error::NotText("a binary file")),
         None => Ok(()),
     }
 }

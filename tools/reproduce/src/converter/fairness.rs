@@ -20,7 +20,7 @@ const SMALL_SHARE: f64 = 0.01;
 /// Twice or half the horizon, three times or a third of the weight: none is better for either output.
 #[test]
 fn no_neighbouring_choice_makes_the_predictive_controller_better() {
-    let design = design(experiment::request(EXAMPLE).unwrap()).unwrap();
+    let design = design(experiment::request(EXAMPLE).unwrap(), "").unwrap();
     let chosen = healthy(&design, HORIZON, INPUT_WEIGHT);
     for horizon in [HORIZON / 2, HORIZON, 2 * HORIZON] {
         for factor in [1.0 / 3.0, 1.0, 3.0] {

@@ -16,9 +16,10 @@ use serde::Serialize;
 /// Both printed theorems on the paper's plant.
 pub fn theorems() -> Result<[PrintedVerdict; 2], Error> {
     let request = request()?;
+    let in_case = experiment::in_case("paper, theorems as printed");
     Ok([
-        theorem_1(&request.plant)?,
-        theorem_2(&request.plant, &request.control)?,
+        theorem_1(&request.plant).map_err(&in_case)?,
+        theorem_2(&request.plant, &request.control).map_err(&in_case)?,
     ])
 }
 
@@ -90,7 +91,8 @@ pub struct DoubledDisturbance {
 /// enters the output by `F = -E / Te`.
 pub fn doubled_disturbance() -> Result<DoubledDisturbance, Error> {
     let Request { plant, control, .. } = request()?;
-    let corrected = synthesise(&plant, &control)?;
+    let in_case = experiment::in_case("paper, disturbance on the integrator");
+    let corrected = synthesise(&plant, &control).map_err(in_case)?;
     let te = plant.sample_time;
     let double = |mode: &Mode| {
         let (n, s) = mode.e.shape();
@@ -139,7 +141,8 @@ pub struct Latency {
 pub fn latency() -> Result<Latency, Error> {
     const DECAY: f64 = 0.9;
     let Request { plant, control, .. } = request()?;
-    let prompt = synthesise(&plant, &control)?;
+    let in_case = experiment::in_case("paper, latency");
+    let prompt = synthesise(&plant, &control).map_err(&in_case)?;
     let gains = prompt.for_controller(&plant).modes;
     let ignored = plant.modes.iter().zip(&gains);
     let delayed = |lyapunov| {
@@ -150,7 +153,7 @@ pub fn latency() -> Result<Latency, Error> {
         match synthesise(&plant, &spec) {
             Ok(feedback) => Ok(Some(feedback)),
             Err(DesignError::Infeasible(_)) => Ok(None),
-            Err(error) => Err(Error::from(error)),
+            Err(error) => Err(in_case(error)),
         }
     };
     let dwell = delayed(Lyapunov::Dwell)?;
