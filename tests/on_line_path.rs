@@ -200,6 +200,10 @@ fn wrong_sizes_are_refused_by_field() {
         ("estimator.tuning.bank.quiet_beside", |p| {
             p.estimator.tuning.bank.quiet_beside = f64::NAN;
         }),
+        // Below 1, more sensors at once would be likelier than fewer.
+        ("estimator.tuning.bank.several", |p| {
+            p.estimator.tuning.bank.several = 0.9
+        }),
         ("estimator.tuning.database.learning_share", |p| {
             p.estimator.tuning.database.learning_share = -1.0;
         }),

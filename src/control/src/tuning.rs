@@ -94,7 +94,7 @@ tuning! {
         pairs_up_to: 4.0, [0.0, 64.0];
         /// Log probability of two sensors failing at once over that of one, and of loads on all states over that of one
         /// load (1): less than for independent ones, which would be two. Each further sensor adds as much as the second.
-        several: 1.5, [0.0, 1e12];
+        several: 1.5, [1.0, 1e12];
         /// The same of all loads and gains at once, and of a plant that is no longer the model (1).
         everything: 2.0, [0.0, 1e12];
         /// Log probability (nat) of a fault before the first sample: one sensor in a hundred.

@@ -826,6 +826,15 @@ fn the_scenario() {
             &["scenario.schedule", "ascending"],
         ),
         (
+            "a point of three numbers",
+            "[20, -0.3]",
+            "[20, -0.3, 1]",
+            &[
+                "scenario.reference[1].points[2] has 3 numbers",
+                "[time, value]",
+            ],
+        ),
+        (
             "too few references",
             "reference = [{ kind = \"steps\", points = [[0, 0.6], [20, -0.3]] }, ",
             "reference = [",
@@ -1123,6 +1132,59 @@ fn a_command_line_without_sense() {
     ] {
         assert_eq!(bench.run(arguments).code(), 2, "{arguments:?}");
     }
+}
+
+/// A number of the command line is told with its option and what to give.
+#[test]
+fn numbers_of_the_command_line() {
+    let bench = Bench::new(SOUND);
+    let campaign = ["campaign", FILE, "--out", "out"];
+    let identify = ["identify", "log.csv", "--out", "found.toml"];
+    let cases: [(&[&str], &[&str], &str); 12] = [
+        (&["design", FILE], &["--threads", "0"], "from 1 to 1024"),
+        (&["design", FILE], &["--threads", "x"], "from 1 to 1024"),
+        (&campaign, &["--runs", "0"], "from 1 to 1000000000"),
+        (&campaign, &["--jobs", "-1"], "from 1 to 1024"),
+        (&campaign, &["--replay", "-1"], "a whole number, 0 or more"),
+        (&campaign, &["--model-error", "x"], "give a number"),
+        (
+            &campaign,
+            &["--model-error", "nan"],
+            "a fraction from 0 to 1",
+        ),
+        (&campaign, &["--resume"], "leave it out"),
+        (&campaign, &["--merge", "none.json"], "check the path"),
+        (&identify, &["--order", "0"], "a whole number, 1 or more"),
+        (&identify, &["--sample-time", "-1"], "a positive number"),
+        (&identify, &["--period", "0"], "a positive number"),
+    ];
+    for (command, given, advice) in cases {
+        let run = bench.run(&[command, given].concat());
+        let said = run.stderr();
+        assert_eq!(run.code(), 2, "{given:?}: {said}");
+        assert!(said.contains(given[0]), "{given:?}: {said}");
+        assert!(said.contains(advice), "{given:?}: {said}");
+    }
+}
+
+/// A key file is told with the option that names it.
+#[test]
+fn keys_of_the_command_line() {
+    let bench = Bench::new(SOUND);
+    let sign = bench.run(&["export", FILE, "--out", "out", "--sign", "no.key"]);
+    assert_eq!(sign.code(), 2);
+    assert!(
+        sign.stderr().starts_with("error: --sign no.key: "),
+        "{}",
+        sign.stderr()
+    );
+    let verify = bench.run(&["verify", "x.fmu", "--key", FILE]);
+    assert_eq!(verify.code(), 2);
+    let said = verify.stderr();
+    assert!(
+        said.starts_with(&format!("error: --key {FILE}: ")),
+        "{said}"
+    );
 }
 
 /// What is wrong inside a table with a kind is told by its key, and no type of this program is named.

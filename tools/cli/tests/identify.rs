@@ -98,6 +98,56 @@ fn wrong_names_are_refused_with_those_that_there_are() {
     );
 }
 
+/// What contradicts itself or the log, and a log that holds too little, are told with option or log.
+#[test]
+fn what_does_not_fit_the_log_is_told_with_its_option_or_the_log() {
+    let bench = Bench::empty();
+    let log = example("logged_closed.csv");
+    let text = std::fs::read_to_string(&log).unwrap();
+    let short: Vec<&str> = text.lines().take(11).collect();
+    std::fs::write(bench.path("short.csv"), short.join("\n")).unwrap();
+    let cases: [(&str, &[&str], &[&str]); 5] = [
+        (
+            &log,
+            &["--sample-time", "7"],
+            &["rows are 5 s apart", "--sample-time is 7", "leave that out"],
+        ),
+        (
+            &log,
+            &["--period", "9"],
+            &["--period", "cannot be told", "give a longer period"],
+        ),
+        (
+            &log,
+            &["--order", "900"],
+            &["logged_closed.csv", "order 900", "another --order"],
+        ),
+        (
+            "short.csv",
+            &[],
+            &["short.csv: mode 1: ", "there are 10", "for longer"],
+        ),
+        (
+            &log,
+            &["--outputs", "pump 1"],
+            &["--outputs names the column \"pump 1\" once more"],
+        ),
+    ];
+    for (log, given, words) in cases {
+        let mut arguments = vec!["identify", log, "--out", "found.toml"];
+        arguments.extend(SIGNALS.iter().filter(|_| !given.contains(&"--outputs")));
+        if given.contains(&"--outputs") {
+            arguments.extend(["--inputs", "pump 1"]);
+        }
+        arguments.extend(given);
+        let run = bench.run(&arguments);
+        assert_eq!(run.code(), 2, "{given:?}: {}", run.stdout());
+        for word in words {
+            assert!(run.stderr().contains(word), "{word}: {}", run.stderr());
+        }
+    }
+}
+
 fn modes(table: &toml::Table) -> Vec<toml::Table> {
     let modes = table["mode"].as_array().unwrap();
     modes

@@ -117,11 +117,11 @@ fn a_wrong_true_plant_is_refused_by_key() {
         ("mode_delay = 100000", vec!["scenario.plant.mode_delay"]),
         (
             "mode = [{}, {}]",
-            vec!["scenario.plant: mode has 2 entries", "1 modes"],
+            vec!["scenario.plant.mode has 2 entries", "1 mode:"],
         ),
         (
             "mode = [{ A = [[1.0]] }]",
-            vec!["scenario.plant", "A of 1 x 1"],
+            vec!["scenario.plant: mode 1: A is 1 x 1", "give it that size"],
         ),
         (
             "told = [{ from = 0, mode = 2 }]",
@@ -350,7 +350,7 @@ fn an_option_out_of_range_is_named() {
         assert_eq!(run.code(), 2);
         let said = run.stderr();
         assert!(
-            said.starts_with(&format!("error: {option}: ")) && said.contains(value),
+            said.starts_with(&format!("error: {option} is ")) && said.contains(value),
             "{said}"
         );
     }
@@ -368,7 +368,7 @@ fn a_model_error_of_a_nonlinear_plant_is_refused() {
     assert_eq!(run.code(), 2, "{}", run.stdout());
     assert!(
         run.stderr()
-            .contains("--model-error: model_error is 0.1, but it changes matrices")
+            .contains("--model-error is 0.1, but it changes matrices")
     );
     assert!(!bench.path("out").exists());
     let run = campaign(&[]);

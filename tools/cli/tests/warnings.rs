@@ -159,6 +159,26 @@ fn thresholds_that_nothing_was_known_for() {
     }
 }
 
+/// A key of which the estimator's method knows nothing is not passed over in silence.
+#[test]
+fn keys_that_the_method_does_not_use() {
+    for (method, key) in [
+        ("observer", "adapt = true"),
+        ("observer", "response_length = 12"),
+        ("reference", "fault_rate = 1e-4"),
+    ] {
+        let asked = damaged("debounce = 1", key).replace("\"reference\"", &format!("\"{method}\""));
+        let (name, _) = key.split_once(' ').unwrap();
+        one(
+            &of_design(&Bench::new(asked)),
+            &[
+                &format!("estimator.{name}: method = \"{method}\""),
+                "leave it out",
+            ],
+        );
+    }
+}
+
 /// The example with logs, the first of them changed cell by cell: row, column of the first level.
 fn logged(change: impl Fn(usize, f64) -> f64) -> Bench {
     let examples = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../../examples");

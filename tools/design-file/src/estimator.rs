@@ -62,6 +62,12 @@ pub(crate) fn estimator(
             "= \"estimated\" is for method = \"observer\" only: change one of them",
         ));
     }
+    for key in unread(given, method) {
+        logs.notes.add(format!(
+            "estimator.{key}: method = \"{}\" does not use it: leave it out, or set another method",
+            name_of(method)
+        ));
+    }
     let mut estimator = EstimatorSpec::default();
     estimator.method = method;
     estimator.response_length = response_length;
@@ -73,6 +79,47 @@ pub(crate) fn estimator(
     estimator.disturbance = disturbance;
     estimator.hypotheses = hypotheses;
     Ok(estimator)
+}
+
+/// What `estimator.method` calls a method.
+fn name_of(method: parameters::EstimatorMethod) -> &'static str {
+    match method {
+        parameters::EstimatorMethod::Observer => "observer",
+        parameters::EstimatorMethod::Reference => "reference",
+        parameters::EstimatorMethod::Sliding => "sliding",
+        parameters::EstimatorMethod::None => "none",
+    }
+}
+
+/// The keys that ask for something of which this method knows nothing.
+fn unread(given: &schema::Estimator, method: parameters::EstimatorMethod) -> Vec<&'static str> {
+    let of_the_database = [
+        ("response_length", given.response_length.is_some()),
+        (
+            "debounce",
+            given.debounce.is_some_and(|samples| samples != 1),
+        ),
+        ("adapt", given.adapt == Some(true)),
+    ];
+    let of_the_observer = [
+        ("model_error", given.model_error.is_some()),
+        ("fault_rate", given.fault_rate.is_some()),
+        ("fault_length", given.fault_length.is_some()),
+        ("input_load", given.input_load.is_some()),
+        ("ambiguous", given.ambiguous.is_some()),
+        ("authority", given.authority.is_some()),
+    ];
+    let (database, observer) = match method {
+        parameters::EstimatorMethod::Observer => (&of_the_database[..], &[][..]),
+        parameters::EstimatorMethod::Reference => (&[][..], &of_the_observer[..]),
+        parameters::EstimatorMethod::Sliding => (&of_the_database[2..], &of_the_observer[..]),
+        // Whoever turns it off for once keeps the keys.
+        parameters::EstimatorMethod::None => (&[][..], &[][..]),
+    };
+    let keys = database.iter().chain(observer);
+    keys.filter(|(_, given)| *given)
+        .map(|(key, _)| *key)
+        .collect()
 }
 
 fn hypotheses(given: &schema::Estimator, dims: Dimensions) -> Result<HypothesesSpec, Complaint> {

@@ -258,7 +258,11 @@ fn column(names: &[&str], name: &str, number: &str, known: &[&str]) -> Result<us
         .collect();
     let advice = match suggest::similar(name, &free) {
         Some(near) => format!("did you mean {near}?"),
-        None => "add it, or give the signal the name of its column in [signals]".into(),
+        None if free.is_empty() => "add it".into(),
+        None => format!(
+            "add it, or name the signal in [signals] as its column, one of {}",
+            free.join(", ")
+        ),
     };
     Err(format!("has no column {wanted}: {advice}"))
 }

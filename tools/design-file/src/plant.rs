@@ -36,7 +36,7 @@ impl Found {
             return Err(Complaint::of(
                 "mode",
                 format!(
-                    "has {}: give one for each of the {} of the model, empty where nothing differs",
+                    "has {}, but the model has {}: give one for each, empty where nothing differs",
                     counted(modes.len(), "entry", "entries"),
                     counted(self.given.len(), "mode", "modes")
                 ),
