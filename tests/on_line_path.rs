@@ -179,7 +179,7 @@ proptest! {
 fn wrong_sizes_are_refused_by_field() {
     use ftc_control::{ControllerError, ControllerParameters, Matrix, SampleError};
     type Damage = fn(&mut ControllerParameters);
-    let damage: [(&str, Damage); 13] = [
+    let damage: [(&str, Damage); 14] = [
         ("modes[1].b", |p| p.modes[1].b = Matrix::zeros(2, 1)),
         ("modes[0].x0", |p| p.modes[0].x0[0] = f64::NAN),
         ("feedback.tracked", |p| p.feedback.tracked = vec![0, 2]),
