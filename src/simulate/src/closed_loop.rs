@@ -3,6 +3,7 @@
 use super::metrics::{Merit, MeritSum};
 use super::plant::{External, PlantSimulator, PlantState};
 use ftc_control::{Compensate, Controller, ControllerState};
+use ftc_record::Signal;
 use serde::Serialize;
 
 /// What closes the loop.
@@ -231,6 +232,19 @@ pub struct Seen<'a> {
     pub command: &'a [f64],
     /// The regulator's inner signals.
     pub report: Report<'a>,
+}
+
+impl Seen<'_> {
+    /// The squares of the true tracking errors in nominal values, added up; `tracked` are rows of the
+    /// outputs (p).
+    pub fn square_error(&self, tracked: &[usize], outputs: &[Signal]) -> f64 {
+        let rows = tracked.iter().zip(&self.plant.reference);
+        rows.map(|(&row, reference)| {
+            let error = (self.plant.y_true[row] - reference) / outputs[row].nominal;
+            error * error
+        })
+        .sum()
+    }
 }
 
 /// As [`run`], but shows each sample to `visit` and keeps none. Returns the first tick, if any, that

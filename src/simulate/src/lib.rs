@@ -21,6 +21,7 @@
 //! ```
 
 pub mod closed_loop;
+pub mod detection;
 pub mod integrate;
 pub mod metrics;
 pub mod plant;

@@ -31,9 +31,10 @@ mod run;
 mod statistics;
 
 pub use draw::{Drawn, draw};
+pub use ftc_simulate::detection::FaultDetection;
 pub use histogram::Histogram;
 pub use partial::{MergeError, Partial, merge};
-pub use run::{FaultDetection, Outcome, run_one};
+pub use run::{Outcome, run_one};
 pub use statistics::{Healthy, KindStatistics, Statistics, Unstable, Worst};
 
 use ftc_control::Controller;
