@@ -544,6 +544,17 @@ fn damaged_logs_are_refused_in_one_sentence() {
             &["row 50 (line 51)", "from 48 to 50", "gaps"],
         ),
         (
+            "another rate",
+            {
+                let mut rows = good.clone();
+                for row in &mut rows {
+                    row[0] *= 2.0;
+                }
+                log(&rows)
+            },
+            &["row 2", "from 0 to 2", "set sample_time to that of the log"],
+        ),
+        (
             "time stands still",
             cell(9, 0, "7"),
             &["row 9", "from 7 to 7", "sample_time is 1"],

@@ -381,9 +381,10 @@ fn disturbance(file: &DesignFile, dims: Dimensions) -> Result<Option<KnownDistur
         return Ok(None);
     };
     at("disturbance.period", check::positive(given.period))?;
+    let mut disturbance = KnownDisturbance::new(given.period);
     let shortest = 2.0 * file.sample_time;
     let harmonics = match given.harmonics {
-        None => defaults::HARMONICS,
+        None => disturbance.harmonics,
         Some(count) => {
             let count = i64::try_from(count).unwrap_or(i64::MAX);
             at(
@@ -423,7 +424,6 @@ fn disturbance(file: &DesignFile, dims: Dimensions) -> Result<Option<KnownDistur
             Some(values)
         }
     };
-    let mut disturbance = KnownDisturbance::new(given.period);
     disturbance.harmonics = harmonics;
     disturbance.amplitude = amplitude;
     Ok(Some(disturbance))

@@ -48,8 +48,6 @@
 //! | `scenario.plant.continuous` | as `continuous` of the file |
 //! | `scenario.plant` | the plant is what it was designed for |
 
-/// `disturbance.harmonics`
-pub const HARMONICS: usize = 1;
 /// `controller.internal_model`
 pub const INTERNAL_MODEL: bool = false;
 /// `scenario.steps`

@@ -1,5 +1,6 @@
 //! From logs of healthy operation to the text of a design file.
 
+use crate::assemble::LARGEST_SIZE;
 use crate::check::ValueError;
 pub use ftc_control::parameters::MOST_HARMONICS;
 use ftc_identify::{Identified, IdentifiedMode, Log, Settings};
@@ -318,7 +319,8 @@ fn rows(
         for &column in outputs {
             y.push(table.number(&row, column, f64::is_finite)?);
         }
-        let whole = |value: f64| (1.0..=64.0).contains(&value) && value.fract() == 0.0;
+        let whole =
+            |value: f64| (1.0..=LARGEST_SIZE as f64).contains(&value) && value.fract() == 0.0;
         modes.push(match mode {
             Some(column) => table.number(&row, column, whole)? as usize - 1,
             None => 0,

@@ -163,7 +163,8 @@ pub enum TimeError {
     /// A gap, a doubled row or a wrong rate.
     #[error(
         "{place}: {column} goes from {before} to {now}, but sample_time is {sample_time}: \
-         record without gaps, one row per sample, or set sample_time to that of the log{}{}",
+         record without gaps, one row per sample{}{}{}",
+        other_rate(*place, now - before),
         coarse(*resolution, *sample_time),
         other_unit(column, now - before, *sample_time)
     )]
@@ -235,6 +236,14 @@ fn other_unit(column: &str, step: f64, sample_time: f64) -> String {
     unit.map_or(String::new(), |(unit, _)| {
         format!("; if its times are in {unit}, name the column {column} [{unit}]")
     })
+}
+
+/// Where the very first step is another, that of the whole log may be meant.
+fn other_rate(place: Place, step: f64) -> &'static str {
+    match place.row == 2 && step > 0.0 {
+        true => ", or set sample_time to that of the log",
+        false => "",
+    }
 }
 
 fn coarse(resolution: f64, sample_time: f64) -> String {
