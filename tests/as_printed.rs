@@ -62,6 +62,6 @@ fn they_need_as_many_outputs_as_states() {
     let error = theorem_1(&plant).unwrap_err().to_string();
     assert_eq!(
         error,
-        "equation (10) as printed needs as many outputs as states, but the plant has 1 and 2"
+        "equation (10) as printed needs as many outputs as states, but the plant has 1 and 2: use the corrected theorems"
     );
 }

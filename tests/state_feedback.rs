@@ -492,7 +492,7 @@ fn more_tracked_outputs_than_inputs_are_refused_at_once() {
     let error = synthesise(&plant, &spec, &Scaling::automatic(&plant)).unwrap_err();
     assert_eq!(
         error.to_string(),
-        "2 tracked outputs need at least 2 inputs, but the plant has 1: track fewer outputs"
+        "2 tracked outputs need as many inputs, but the plant has 1: track fewer outputs"
     );
 }
 

@@ -180,6 +180,9 @@ class Bank:
         self.noise_ratio = np.full(p, self.tuning["noise_at_start"])
         self.noise_samples = self.tuning["noise_prior"]
         self.noise = np.zeros(p)
+        self.model_share = np.ones(len(modes))
+        self.model_samples = np.full(len(modes), self.tuning["model_prior"])
+        self.from_model = np.zeros(p)
         self.repeats = Repeats(p, self.tuning)
         # Whose reading repeats, whose does so no more, and the leading hypothesis without the readings that repeat.
         self.repeating = self.resumed = NOBODY
@@ -219,6 +222,7 @@ class Bank:
         self.seen = {id(h): self._predict(h, reading) for h in self.hypotheses}
         head = self.hypotheses[0]
         self.repeats.watch(head, self.seen[id(head)], reading, self.unloaded)
+        self._learn_model_error(head, reading)
         if self._nothing_happened(head):
             self._go_on()
         else:
@@ -418,6 +422,22 @@ class Bank:
             ratio = self.noise_ratio[q] * (1.0 + (relative - 1.0) / self.noise_samples)
             self.noise_ratio[q] = min(max(ratio, 1.0), tuning["noise_limit"])
 
+    def _learn_model_error(self, head: Hypothesis, reading: Reading) -> None:
+        """Fisher scoring for the variance of the model's error, relative to the assumed one."""
+        seen, tuning, mode = self.seen[id(head)], self.tuning, head.moved_by
+        if not seen.regular or head.loose:
+            return
+        for q in sorted(set(np.flatnonzero(reading.valid)) - head.flagged):
+            part = self.from_model[q] / seen.S[q, q]
+            square = min(seen.r[q] ** 2 / seen.S[q, q], tuning["outlier"])
+            self.model_samples[mode] = min(self.model_samples[mode] + part**2, tuning["model_memory"])
+            share = self.model_share[mode] * (1.0 + part * (square - 1.0) / self.model_samples[mode])
+            self.model_share[mode] = min(max(share, tuning["model_share_least"]), tuning["model_share_most"])
+
+    def _model_error(self, mode: int) -> float:
+        """Returns the variance of the relative error of the entries of a mode's matrices, as far as it is known."""
+        return self.settings["model_error"] ** 2 * self.model_share[mode]
+
     def _conclude(self, reading: Reading) -> None:
         at, best, seen = self.at, self.best, self.seen[id(self.best)]
         plant = self.plants[self.mode]
@@ -446,8 +466,12 @@ class Bank:
         for run in (self.unloaded, self.usual):
             run.advance(self.plants[self.mode], self.best.z[self.at.wave].copy(), u)
         self.moved_by = self.mode
+        plant = self.plants[self.best.mode]
+        changes = self._model_error(self.best.mode) * self.best.unmodelled(plant, self.moved)
+        self.from_model = plant.C**2 @ changes
         self._branch(shows_at_once=False)
-        motion = Motion(u, self.moved, self.outputs_may_err)
+        errors = [self._model_error(mode) for mode in range(len(self.plants))]
+        motion = Motion(u, self.moved, errors, self.outputs_may_err)
         for h in [*self.hypotheses, *([self.aside[0]] if self.aside else [])]:
             h.advance(self.plants[h.mode], self.settings, self.noise, motion)
         self._branch(shows_at_once=True)
@@ -483,7 +507,7 @@ class Bank:
     def _enter(self, h: Hypothesis, mode: int) -> None:
         """A mode begins: what the model misses there, and what a load does, may differ."""
         plant, at = self.plants[mode], self.at
-        error = self.settings["model_error"] ** 2
+        error = self._model_error(mode)
         shows_at_once = self.plants[h.mode].shows_unlike(plant)
         h.mode = mode
         on_states = at.load[at.m + at.s :]
@@ -753,7 +777,7 @@ class Proposals:
             log_rate = 0.0 if q in self.resumed else self.log_rate["release"]
             self._release(frozenset({q}), log_rate, convinced=h.convinced or len(h.flagged) == 1)
         if len(known) > 1:
-            self._release(h.flagged, self._together(len(known)) * self.log_rate["release"], convinced=True)
+            self._release(h.flagged, self._together(len(h.flagged)) * self.log_rate["release"], convinced=True)
 
     def _release(self, sensors: frozenset[int], log_rate: float, *, convinced: bool) -> None:
         """The recovery of these sensors, unless what it leaves is there already."""

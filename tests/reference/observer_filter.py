@@ -83,7 +83,7 @@ class Plant:
         """Forms matrices and sizes from the design and, where there are logs, from what they say."""
         own = (mode.A, mode.B, mode.C, mode.E, mode.F)
         self.A, self.B, self.C, E, F = (np.array(fitted[key]) for key in "abcef") if fitted else own
-        self.x0, self.u0 = mode.x0, mode.u0
+        self.x0, self.u0, self.noise = mode.x0, mode.u0, np.array(settings["noise"])
         n, m, p = len(self.A), self.B.shape[1], len(self.C)
         E, F = E.reshape(n, -1), F.reshape(p, -1)
         s = len(settings["disturbance_load"])
@@ -135,10 +135,9 @@ class Plant:
         return T
 
     def shows_unlike(self, other: Plant) -> bool:
-        """Whether the outputs of two modes differ at the same state."""
-        return not all(
-            np.array_equal(own, its) for own, its in ((self.C, other.C), (self.Fd, other.Fd), (self.c, other.c))
-        )
+        """Whether the outputs of two modes differ at the same state, by more than rounding."""
+        same = all(np.array_equal(own, its) for own, its in ((self.C, other.C), (self.Fd, other.Fd)))
+        return not same or bool(np.any(np.abs(self.c - other.c) > 1e-6 * self.noise))
 
     def jump(self, loads: np.ndarray, gains: np.ndarray, u: np.ndarray, gain_error: float) -> np.ndarray:
         """Returns the covariance that a jump before the last sample under `u` leaves: it has acted once."""
@@ -282,15 +281,19 @@ class Hypothesis:
         self.P = (self.P + self.P.T) / 2
         self.z = bounded(self.z + K @ seen.r)
 
+    def unmodelled(self, plant: Plant, moved: np.ndarray) -> np.ndarray:
+        """Returns the square of what each state changes by, where entries of the matrices are wrong by their size."""
+        return plant.A**2 @ (self.z[plant.layout.x] - self.before) ** 2 + plant.B**2 @ moved**2
+
     def advance(self, plant: Plant, settings: dict, noise: np.ndarray, motion: Motion) -> None:
         """Predicts the next sample."""
         at = plant.layout
         self.moved_by = self.mode
         Q = np.zeros(at.size)
         # The model's error acts as a load that moves as the state and the input move.
-        error = settings["changed_error" if self.loose else "model_error"] ** 2
+        error = settings["changed_error"] ** 2 if self.loose else motion.model_errors[self.mode]
+        Q[at.load[at.m + at.s :]] += error * self.unmodelled(plant, motion.moved)
         moved, self.before = (self.z[at.x] - self.before) ** 2, self.z[at.x].copy()
-        Q[at.load[at.m + at.s :]] += error * (plant.A**2 @ moved + plant.B**2 @ motion.moved**2)
         Q[at.load] += plant.load_walk**2
         Q[at.gain] += settings["gain_walk"] ** 2
         # So does the error of the period as the disturbance turns.
@@ -336,8 +339,9 @@ class Hypothesis:
 
 @dataclass
 class Motion:
-    """What moves the plant over a sample: the input, and how it differs from the last."""
+    """What moves the plant over a sample: the input, how it differs from the last, and how wrong each model is."""
 
     u: np.ndarray
     moved: np.ndarray
+    model_errors: list[float]
     outputs_may_err: bool

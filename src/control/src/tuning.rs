@@ -169,6 +169,14 @@ tuning! {
         noise_limit: 100.0, [1.0, 1e12];
         /// Squared innovation over its variance (1) beyond which it is not taken for noise: three deviations.
         outlier: 9.0, [0.0, 1e12];
+        /// Least variance of the model's error over the one assumed (1): a fifth of the deviation.
+        model_share_least: 0.04, [1e-6, 1.0];
+        /// Largest (1): ten times the deviation.
+        model_share_most: 100.0, [1.0, 1e6];
+        /// Samples that the assumed variance counts for, where all that is not expected is the model's error.
+        model_prior: 8.0, [1.0, 1e12];
+        /// Samples over which it is estimated afterwards, counted like that.
+        model_memory: 300.0, [1.0, 1e12];
         /// Log likelihood (nat) by which a switch at this sample must be more likely than an earlier one to replace it.
         switch_restart: 3.0, [0.0, 1e12];
         /// Log likelihood (nat) that a fault whose estimate is zero loses per sample: none is left after two hundred.

@@ -302,7 +302,9 @@ fn hypotheses(design: &Design, settings: &Hypotheses) -> Vec<(String, String)> {
     let error = number(100.0 * settings.model_error);
     let mut lines = vec![line(
         "model error",
-        format!("{error} % of each entry, {source}"),
+        format!(
+            "{error} % of each entry, {source}; learned from the readings where the plant moves"
+        ),
     )];
     lines.extend(fitted(design, settings));
     if !settings.fitted.is_empty() {

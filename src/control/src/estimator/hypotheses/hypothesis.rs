@@ -104,6 +104,8 @@ pub struct Step<'a> {
     pub settings: &'a Settings,
     /// Tuning constants.
     pub tuning: &'a BankTuning,
+    /// Variance of the relative error of the entries of the plant's matrices.
+    pub model_error: f64,
     /// Noise deviation (p).
     pub noise: &'a [f64],
     /// Cosine and sine of the angle by which each pair of the disturbance turns.
@@ -389,6 +391,29 @@ impl Hypothesis {
         self.limit(step, active);
     }
 
+    /// By how much each state changes (n), squared, where entries of the matrices are wrong by their size, after
+    /// the input `moved` (m) and the state moved.
+    pub fn unmodelled(
+        &self,
+        layout: Layout,
+        model: &ModeModel,
+        moved: &[f64],
+        changes: &mut [f64],
+    ) {
+        for (i, change) in changes.iter_mut().enumerate() {
+            let mut sum = 0.0;
+            for &(at, a) in &model.motion.parts(i)[0] {
+                let step = self.z[at] - self.before[at];
+                sum += a * a * (step * step);
+            }
+            for &(at, b) in model.by_gain.row(i) {
+                let s = moved[at - layout.gain()];
+                sum += b * b * s * s;
+            }
+            *change = sum;
+        }
+    }
+
     /// The model's error acts as a load that moves as the state and the input move; loads, gain errors
     /// and the disturbance wander.
     fn drift(&mut self, step: &Step<'_>, scratch: &mut [f64]) {
@@ -400,28 +425,20 @@ impl Hypothesis {
         } = *step;
         let (stride, load, gain) = (layout.stride(), layout.load(), layout.gain());
         let error = if self.loose {
-            settings.changed_error
+            settings.changed_error * settings.changed_error
         } else {
-            settings.model_error
+            step.model_error
         };
-        let error = error * error;
+        let (changes, scratch) = scratch.split_at_mut(layout.n);
+        self.unmodelled(layout, model, step.moved, changes);
+        for (k, change) in (load + layout.state_load()..gain).zip(&*changes) {
+            self.cov[k * stride + k] += error * change;
+        }
         let moved = &mut scratch[..layout.n];
         for ((out, before), &x) in moved.iter_mut().zip(&mut self.before).zip(&self.z) {
             let step = x - *before;
             *out = step * step;
             *before = x;
-        }
-        let from = load + layout.state_load();
-        for (i, k) in (from..gain).enumerate() {
-            let mut sum = 0.0;
-            for &(at, a) in &model.motion.parts(i)[0] {
-                sum += a * a * moved[at];
-            }
-            for &(at, b) in model.by_gain.row(i) {
-                let s = step.moved[at - gain];
-                sum += b * b * s * s;
-            }
-            self.cov[k * stride + k] += error * sum;
         }
         for (k, growth) in (load..).zip(&model.growth) {
             self.cov[k * stride + k] += growth;

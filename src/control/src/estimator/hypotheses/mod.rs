@@ -148,6 +148,11 @@ pub struct BankState {
     /// Its variance relative to the design's (p), and how many samples it rests on.
     noise_ratio: Vec<f64>,
     noise_samples: f64,
+    /// Variance of the model's error relative to the assumed one, and how many samples it rests on (modes each).
+    model_share: Vec<f64>,
+    model_samples: Vec<f64>,
+    /// What the model's error of the last sample adds to the variance of each output (p).
+    from_model: Vec<f64>,
     /// Evidence that a sensor repeats one value, the same before this sample, that value's mean, and of how
     /// many samples (p each).
     evidence: Vec<f64>,
@@ -200,6 +205,9 @@ crate::state!(BankState {
         moved,
         noise,
         noise_ratio,
+        model_share,
+        model_samples,
+        from_model,
         evidence,
         evidence_before,
         repeated,
@@ -283,6 +291,7 @@ impl Bank {
         for slot in state.in_use.slots() {
             state.seen[slot].whiten(p);
         }
+        self.learn_model_error(state, head, reading);
         let h = &state.slots[head];
         let nothing_happened = h.flagged() == 0
             && !h.loose
@@ -340,6 +349,49 @@ impl Bank {
                 *ratio = ratio.clamp(1.0, tuning.noise_limit);
             }
         }
+    }
+
+    /// How wrong the model of the mode that moved the plant is, from the innovations of the hypothesis in slot `head`,
+    /// whatever they are taken for: a step of Fisher scoring for the share of the assumed variance.
+    fn learn_model_error(&self, state: &mut BankState, head: usize, reading: Reading<'_>) {
+        let (p, tuning) = (self.layout.p, &self.tuning);
+        let (seen, h) = (&state.seen[head], &state.slots[head]);
+        if !seen.regular || h.loose {
+            return;
+        }
+        let mode = h.moved_by as usize;
+        for q in (0..p).filter(|&q| has(reading.valid & !h.flagged(), q)) {
+            let factor = &seen.s[q * p..=q * p + q];
+            let variance = dot(factor, factor);
+            let part = state.from_model[q] / variance;
+            let square = (seen.r[q] * seen.r[q] / variance).min(tuning.outlier);
+            if (part * square).is_finite() {
+                let samples = &mut state.model_samples[mode];
+                *samples = (*samples + part * part).min(tuning.model_memory);
+                let share = &mut state.model_share[mode];
+                *share += *share * part * (square - 1.0) / *samples;
+                *share = share.clamp(tuning.model_share_least, tuning.model_share_most);
+            }
+        }
+    }
+
+    /// What the model's error does to the outputs of the coming sample.
+    fn expect_model_error(&self, state: &mut BankState) {
+        let Layout { n, .. } = self.layout;
+        let h = &state.slots[state.best];
+        let model = &self.modes[h.mode as usize];
+        let error = self.model_error(&state.model_share, h.mode);
+        let scratch = &mut state.scratch[..n];
+        h.unmodelled(self.layout, model, &state.moved, scratch);
+        for (row, from_model) in model.c.chunks_exact(n).zip(&mut state.from_model) {
+            let terms = row.iter().zip(&*scratch);
+            *from_model = error * terms.map(|(c, v)| c * c * v).sum::<f64>();
+        }
+    }
+
+    /// Variance of the relative error of the entries of the matrices of `mode`, as far as it is known.
+    fn model_error(&self, shares: &[f64], mode: u32) -> f64 {
+        self.settings.model_error * self.settings.model_error * shares[mode as usize]
     }
 
     /// Which sensors repeat one value while the model moves.
@@ -496,12 +548,14 @@ impl Bank {
             run.advance(self.layout, model, z, u, next);
         }
         state.moved_by = state.mode as u32;
+        self.expect_model_error(state);
         self.branch(state, false);
         let mut step = Step {
             layout: self.layout,
             model,
             settings: &self.settings,
             tuning: &self.tuning,
+            model_error: 0.0,
             noise: &state.noise,
             rotation: &self.rotation,
             waves: &self.waves,
@@ -510,7 +564,9 @@ impl Bank {
             moved: &state.moved,
         };
         for slot in state.in_use.slots().chain(self.in_use_aside(state)) {
-            step.model = &self.modes[state.slots[slot].mode as usize];
+            let mode = state.slots[slot].mode;
+            step.model = &self.modes[mode as usize];
+            step.model_error = self.model_error(&state.model_share, mode);
             state.slots[slot].advance(&step, &mut state.scratch);
         }
         self.branch(state, true);

@@ -10,9 +10,17 @@ use super::linear::dot;
 use super::model::{Layout, ModeModel};
 use super::{Bank, BankState, SlotsInUse};
 
-/// Whether two modes differ in what they make of one state, so that a switch shows in the sample of it.
-pub(super) fn differ_at_once(one: &ModeModel, other: &ModeModel) -> bool {
-    one.c != other.c || one.f != other.f || one.output_offset != other.output_offset
+/// Share of the noise below which the difference of two modes' offsets is that of their rounding.
+const ROUNDING: f64 = 1e-6;
+
+/// Whether two modes differ in what they make of one state, so that a switch shows in the sample of it, on sensors
+/// with this `noise` (p).
+pub(super) fn differ_at_once(one: &ModeModel, other: &ModeModel, noise: &[f64]) -> bool {
+    let offsets = one.output_offset.iter().zip(&other.output_offset);
+    let mut offsets = offsets.zip(noise);
+    one.c != other.c
+        || one.f != other.f
+        || offsets.any(|((own, its), noise)| (own - its).abs() > ROUNDING * noise)
 }
 
 impl Bank {
@@ -35,7 +43,9 @@ impl Bank {
             let h = &mut state.slots[slot];
             match state.first {
                 true => (h.mode, h.moved_by) = (mode as u32, mode as u32),
-                false if h.mode as usize != mode => self.enter(h, mode, &state.u),
+                false if h.mode as usize != mode => {
+                    self.enter(h, mode, &state.u, &state.model_share);
+                }
                 false => {}
             }
         }
@@ -43,12 +53,12 @@ impl Bank {
 
     /// The plant enters `mode` under the input `u` (m): what the model misses, and what a load does, may
     /// differ.
-    fn enter(&self, h: &mut Hypothesis, mode: usize, u: &[f64]) {
+    fn enter(&self, h: &mut Hypothesis, mode: usize, u: &[f64], shares: &[f64]) {
         let Layout { n, m, .. } = self.layout;
         let stride = self.layout.stride();
         let load = self.layout.load() + self.layout.state_load();
         let model = &self.modes[mode];
-        let error = self.settings.model_error * self.settings.model_error;
+        let error = self.model_error(shares, mode as u32);
         let at_once = self.at_once[h.mode as usize * self.modes.len() + mode];
         h.mode = mode as u32;
         let mean = dot(&h.z[load..load + n], &h.z[load..load + n]) / n.max(1) as f64;
@@ -142,7 +152,7 @@ impl Bank {
             let (parent, child) = super::effect::pair(&mut state.slots, head, slot);
             child.take(parent);
             child.score = score;
-            self.enter(child, mode, &state.u);
+            self.enter(child, mode, &state.u, &state.model_share);
             if standing.is_none() {
                 state.in_use.add(slot);
             }

@@ -293,11 +293,8 @@ impl Bank {
             self.propose_release(state, parent, model, reading, release);
         }
         if known.count_ones() > 1 {
-            let all = (
-                parent.flagged,
-                self.tuning.together(known.count_ones()) * log_rates.release,
-                true,
-            );
+            let together = self.tuning.together(parent.flagged.count_ones());
+            let all = (parent.flagged, together * log_rates.release, true);
             self.propose_release(state, parent, model, reading, all);
         }
     }

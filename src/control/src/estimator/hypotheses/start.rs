@@ -219,7 +219,7 @@ impl Bank {
         Self {
             layout,
             at_once: pairs
-                .map(|(one, other)| differ_at_once(one, other))
+                .map(|(one, other)| differ_at_once(one, other, &settings.noise))
                 .collect(),
             modes,
             rotation: (0..disturbances).flat_map(turn).collect(),
@@ -283,6 +283,9 @@ impl Bank {
             noise: vec![0.0; p],
             noise_ratio: vec![self.tuning.noise_at_start; p],
             noise_samples: self.tuning.noise_prior,
+            model_share: vec![1.0; self.modes.len()],
+            model_samples: vec![self.tuning.model_prior; self.modes.len()],
+            from_model: vec![0.0; p],
             evidence: vec![0.0; p],
             evidence_before: vec![0.0; p],
             repeated: vec![0.0; p],
