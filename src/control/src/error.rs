@@ -7,7 +7,7 @@ use alloc::string::String;
 #[non_exhaustive]
 pub enum ControllerError {
     /// A list has another length than the rest asks for.
-    #[error("{field} has {found} entries, but the controller needs {needed}")]
+    #[error("the length of {field} is {found}, but the controller needs {needed}")]
     Length {
         /// Path of the field, such as `estimator.thresholds`; indices count from 0.
         field: String,
@@ -57,7 +57,7 @@ pub enum ControllerError {
 #[non_exhaustive]
 pub enum SampleError {
     /// A vector has another length than the controller needs.
-    #[error("the {signal} has {found} entries, but the controller needs {needed}")]
+    #[error("the length of the {signal} is {found}, but the controller needs {needed}")]
     Length {
         /// Which signal.
         signal: &'static str,

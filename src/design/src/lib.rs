@@ -74,6 +74,7 @@ pub use ftc_record::{
 pub use hypotheses::{HypothesesSpec, MODE_LENGTH};
 pub use lyapunov::{DwellTime, Lyapunov};
 pub use observer::{LostCertificate, ObserverCertificate, ObserverDesign};
+pub use parallel::MOST_THREADS;
 pub use proof::{ControlProof, ObserverProof, Proof};
 pub use request::RequestError;
 pub use running_loop::{LostSensors, RunningLoop, SwitchingGain};

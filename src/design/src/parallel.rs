@@ -3,6 +3,9 @@
 use rayon::prelude::*;
 use std::sync::{Mutex, PoisonError};
 
+/// The most threads that a pool for a design, or for a campaign of one, is asked to have.
+pub const MOST_THREADS: usize = 1024;
+
 /// What `find` makes of every item, in their order. Called inside a pool of threads (`rayon`), it works on
 /// several at the same time; what comes back is the same to the bit.
 pub(crate) fn each<T: Sync, R: Send>(items: &[T], find: impl Fn(&T) -> R + Sync + Send) -> Vec<R> {

@@ -6,7 +6,7 @@ use crate::{check_output, failure::Failure};
 use campaign::files::{self, PAGE, RESULT, RowFile};
 use campaign::{Options, OptionsError, Partial, Watch};
 use clap::Args;
-use ftc_design::Design;
+use ftc_design::{Design, MOST_THREADS};
 use report::Made;
 use std::fmt::Write as _;
 use std::ops::Range;
@@ -32,7 +32,7 @@ pub struct Arguments {
     #[arg(long, default_value_t = 1, value_parser = whole::<u64>(0, u64::MAX), allow_negative_numbers = true)]
     seed: u64,
     /// Threads; as many as the machine has if left out. The results do not depend on it.
-    #[arg(long, value_parser = whole::<u16>(1, 1024), allow_negative_numbers = true)]
+    #[arg(long, value_parser = whole::<u16>(1, MOST_THREADS as u64), allow_negative_numbers = true)]
     jobs: Option<u16>,
     /// Do only shard I of N (from 1): put them together with --merge.
     #[arg(long, value_name = "I/N", value_parser = parse_shard)]

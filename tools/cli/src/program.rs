@@ -24,7 +24,7 @@ use design_file::{Loaded, examples};
 use failure::Failure;
 use ftc_design::as_printed::{theorem_1, theorem_2};
 use ftc_design::assembly::Request;
-use ftc_design::{Design, Run, Solver, Step};
+use ftc_design::{Design, MOST_THREADS, Run, Solver, Step};
 use output::Staging;
 use package::solved::{self, LoadError};
 use progress::Progress;
@@ -54,7 +54,7 @@ struct Arguments {
     /// Work on so many independent parts of a design at the same time, such as the modes under dwell and sets
     /// of lost sensors. The design does not depend on it; memory grows with it.
     #[arg(long, global = true, value_name = "N", default_value_t = 1, allow_negative_numbers = true,
-          value_parser = failure::whole::<u16>(1, 1024))]
+          value_parser = failure::whole::<u16>(1, MOST_THREADS as u64))]
     threads: u16,
 }
 

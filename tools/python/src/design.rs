@@ -5,17 +5,14 @@ use crate::controller::Controller;
 use crate::errors::{self, Author};
 use crate::run::Run;
 use crate::waiting::wait;
-use ftc_design::DesignError;
 use ftc_design::assembly::assemble;
+use ftc_design::{DesignError, MOST_THREADS};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use pyo3::types::PyBytes;
 use report::{Made, Source, summary};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
-
-/// The most threads of one design.
-const MOST_THREADS: usize = 1024;
 
 /// A finished design.
 #[pyclass(frozen, module = "ftc_fmu._core")]
