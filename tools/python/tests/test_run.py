@@ -127,7 +127,7 @@ def test_another_scenario(paper: ftc.Design) -> None:
     short = paper.simulate({"steps": 50, "reference": [0.3, 0.3]})
     assert len(short["t"]) == 50
     assert not short["f"].any()
-    with pytest.raises(ValueError, match=r"^scenario\.reference has 1 signals"):
+    with pytest.raises(ValueError, match=r"^scenario\.reference has 1 signal:"):
         paper.simulate({"reference": [0.3]})
     assert len(paper.simulate()["t"]) == 1600
 
