@@ -429,16 +429,10 @@ impl Hypothesis {
         } else {
             step.model_error
         };
-        let (changes, scratch) = scratch.split_at_mut(layout.n);
+        let changes = &mut scratch[..layout.n];
         self.unmodelled(layout, model, step.moved, changes);
         for (k, change) in (load + layout.state_load()..gain).zip(&*changes) {
             self.cov[k * stride + k] += error * change;
-        }
-        let moved = &mut scratch[..layout.n];
-        for ((out, before), &x) in moved.iter_mut().zip(&mut self.before).zip(&self.z) {
-            let step = x - *before;
-            *out = step * step;
-            *before = x;
         }
         for (k, growth) in (load..).zip(&model.growth) {
             self.cov[k * stride + k] += growth;
@@ -455,12 +449,14 @@ impl Hypothesis {
             for q in 0..layout.p {
                 let mut sum = 0.0;
                 for &(at, c) in &model.outputs.parts(q)[0] {
-                    sum += c * c * moved[at];
+                    let moved = self.z[at] - self.before[at];
+                    sum += c * c * (moved * moved);
                 }
                 let k = layout.fault() + q;
                 self.cov[k * stride + k] += error * sum;
             }
         }
+        self.before.copy_from_slice(&self.z[..layout.n]);
     }
 
     /// `F P F'` but for the turning of the disturbance, in the rows of the plant's state.
