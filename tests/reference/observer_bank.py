@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 import record
-from observer_filter import NOBODY, Hypothesis, Motion, Plant, Reading, Seen, bounded
+from observer_filter import NOBODY, Hypothesis, Jump, Motion, Plant, Reading, Seen, bounded
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -578,10 +578,8 @@ class Proposals:
     def _plant_changes(self) -> None:
         h, bank, tuning = self.h, self.bank, self.tuning
         if self.unlikely:
-            jumps = self.plant.jumps
-            for number, jump in enumerate(jumps):
-                several = {0: tuning["everything"], len(jumps) - 1: tuning["several"]}.get(number, 1.0)
-                self._add("load", several * self.log_rate["load"], self._jumped(jump), convinced=h.convinced)
+            for jump in self.plant.jumps(self.log_rate["load"], tuning):
+                self._add("load", jump.log_rate, self._jumped(jump), convinced=h.convinced)
             if not h.loose:
                 log_rate = tuning["everything"] * self.log_rate["load"]
                 self._add("loosen", log_rate, self._loosened, convinced=h.convinced)
@@ -612,9 +610,9 @@ class Proposals:
         child.loose = False
         return child
 
-    def _jumped(self, jump: tuple[np.ndarray, np.ndarray]) -> Callable[[Hypothesis], None]:
+    def _jumped(self, jump: Jump) -> Callable[[Hypothesis], None]:
         def change(child: Hypothesis) -> None:
-            child.P = child.P + self.plant.jump(*jump, self.bank.u, self.bank.settings["gain_error"])
+            child.P = child.P + self.plant.jump(jump, self.bank.u, self.bank.settings["gain_error"])
 
         return change
 

@@ -76,6 +76,16 @@ class Layout:
         return self.n + self.d + self.loads + self.m + self.p
 
 
+@dataclass
+class Jump:
+    """Loads and gains that jump together, how probable that is, and its size over that of a usual one."""
+
+    log_rate: float
+    loads: np.ndarray
+    gains: np.ndarray
+    scale: float = 1.0
+
+
 class Plant:
     """One mode as the estimator knows it."""
 
@@ -139,30 +149,31 @@ class Plant:
         same = all(np.array_equal(own, its) for own, its in ((self.C, other.C), (self.Fd, other.Fd)))
         return not same or bool(np.any(np.abs(self.c - other.c) > 1e-6 * self.noise))
 
-    def jump(self, loads: np.ndarray, gains: np.ndarray, u: np.ndarray, gain_error: float) -> np.ndarray:
+    def jump(self, jump: Jump, u: np.ndarray, gain_error: float) -> np.ndarray:
         """Returns the covariance that a jump before the last sample under `u` leaves: it has acted once."""
         at = self.layout
         columns = [np.zeros((at.size, 0))]
-        for k in loads:
+        for k in jump.loads:
             column = np.zeros(at.size)
             column[at.x], column[at.load[k]] = self.G[:, k], 1.0
-            columns.append(self.load_size[k] * column[:, None])
-        for k in gains:
+            columns.append(jump.scale * self.load_size[k] * column[:, None])
+        for k in jump.gains:
             column = np.zeros(at.size)
             column[at.x], column[at.gain[k]] = self.B[:, k] * u[k], 1.0
             columns.append(gain_error * column[:, None])
         root = np.hstack(columns)
         return root @ root.T
 
-    @cached_property
-    def jumps(self) -> list[tuple[np.ndarray, np.ndarray]]:
-        """What may jump together, loads and gains: all; each input; each disturbance channel; all states."""
+    def jumps(self, log_rate: float, tuning: dict) -> list[Jump]:
+        """What may jump together: all; each input; each disturbance channel; all states, as usual or farther."""
         at = self.layout
         none = np.arange(0)
-        every = (np.arange(at.loads), np.arange(at.m))
-        each = [(np.array([j]), np.array([j])) for j in range(at.m)]
-        waves = [(np.array([j]), none) for j in range(at.m, at.m + at.s)]
-        return [every, *each, *waves, (np.arange(at.m + at.s, at.loads), none)]
+        every = Jump(tuning["everything"] * log_rate, np.arange(at.loads), np.arange(at.m))
+        each = [Jump(log_rate, np.array([j]), np.array([j])) for j in range(at.m)]
+        waves = [Jump(log_rate, np.array([j]), none) for j in range(at.m, at.m + at.s)]
+        states = Jump(tuning["several"] * log_rate, np.arange(at.m + at.s, at.loads), none)
+        rarer = states.log_rate + tuning["large_load_log_rate"]
+        return [every, *each, *waves, states, replace(states, log_rate=rarer, scale=tuning["large_load"])]
 
 
 @dataclass
@@ -326,7 +337,7 @@ class Hypothesis:
         most = np.zeros(at.size)
         most[at.x] = 1e8 * np.square(settings["start_elsewhere"])
         most[at.wave] = np.square(settings["disturbance_size"])
-        most[at.load] = 4.0 * np.maximum(plant.load_size**2, self.z[at.load] ** 2)
+        most[at.load] = 36.0 * np.maximum(plant.load_size**2, self.z[at.load] ** 2)
         most[at.gain] = settings["gain_error"] ** 2
         most[at.fault] = plant.output_variance
         for q in self.flagged:

@@ -301,6 +301,10 @@ impl Controller {
         let mut moved_by = None;
         if let (Some(bank), Some(judged)) = (&self.bank, &mut state.bank) {
             bank.observe(judged, told, readings, sample.thresholds);
+            // Every change of the command then looks like a fault.
+            if state.delay.found().is_some() {
+                judged.believe(readings);
+            }
             state.estimator.adopt(settings, judged, readings);
             if self.finds_the_mode() && !sample.telling {
                 let (found, before) = judged.mode();

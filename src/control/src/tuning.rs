@@ -110,8 +110,13 @@ tuning! {
         /// Variance of loads on the states after a switch, beside the model's error, over the square of the loads before
         /// (1): they may have changed sign.
         load_at_switch: 2.0, [0.0, 1e12];
-        /// Largest variance of a load over that of its jumps, or over its square (1): two deviations.
-        load_limit: 4.0, [0.0, 1e12];
+        /// Size of a large jump of the loads on all states over that of a usual one (1).
+        large_load: 3.0, [0.0, 1e12];
+        /// Log probability (nat) of a large jump over that of a usual one: one in ten.
+        large_load_log_rate: -2.3, [-1e6, 0.0];
+        /// Largest variance of a load over that of its usual jumps, or over its square (1): six deviations. With two,
+        /// what a wrong model does was beyond it, and taken for a fault.
+        load_limit: 36.0, [0.0, 1e12];
         /// Largest variance of a fault over that of a new one (1).
         fault_limit: 2.0, [0.0, 1e12];
         /// Variance (1, per sample) by which the error of a sensor's gain wanders.

@@ -618,7 +618,8 @@ impl Hypothesis {
         let (stride, load, gain) = (layout.stride(), layout.load(), layout.gain());
         let loads = layout.loads();
         for k in jump.loads.clone() {
-            let variance = model.load_size[k] * model.load_size[k];
+            let size = jump.scale * model.load_size[k];
+            let variance = size * size;
             let at = load + k;
             self.cov[at * stride + at] += variance;
             for i in 0..n {

@@ -585,6 +585,15 @@ impl BankState {
             && self.slots.iter().all(exists)
     }
 
+    /// The sensors are believed, all whose readings `y` (p) are numbers: the loop is not the one that was designed.
+    pub fn believe(&mut self, y: &[f64]) {
+        self.flagged = 0;
+        for (q, &value) in y.iter().enumerate().take(Sensors::BITS as usize) {
+            self.flagged |= Sensors::from(!is_measurement(value)) << q;
+        }
+        self.model_valid = false;
+    }
+
     /// The plant's mode (0-based) by the leading hypothesis, and the mode that moved it to this sample.
     pub fn mode(&self) -> (usize, usize) {
         (self.mode, self.best().moved_by as usize)

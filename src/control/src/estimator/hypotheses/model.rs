@@ -1,6 +1,7 @@
 //! What the estimator knows beforehand: the plant per mode, and sizes and rates of what may happen.
 
 use super::linear::{Sparse, multiply, multiply_transposed, padded, sparse_dot};
+use crate::tuning::BankTuning;
 use alloc::vec;
 use alloc::vec::Vec;
 use core::ops::Range;
@@ -23,6 +24,10 @@ pub struct Layout {
 /// A jump of loads from one source, or of all at once.
 #[derive(Clone, Debug)]
 pub struct Jump {
+    /// Logarithm of its probability per sample.
+    pub log_rate: f64,
+    /// Its size over that of a usual one.
+    pub scale: f64,
     /// Which loads jump.
     pub loads: Range<usize>,
     /// Covariance of their effect on the outputs (p x p).
@@ -108,11 +113,16 @@ pub struct ModeModel {
     pub outputs: Sparse<2>,
 }
 
-/// Of everything at once, of each input, of each wave, and of the states.
-fn jumps(layout: Layout, c: &[f64], g: &[f64], load_size: &[f64]) -> Vec<Jump> {
+/// Of everything at once, of each input, of each wave, and of the states, as large as usual or larger.
+fn jumps(
+    layout: Layout,
+    (c, g): (&[f64], &[f64]),
+    load_size: &[f64],
+    (log_rate, tuning): (f64, &BankTuning),
+) -> Vec<Jump> {
     let Layout { n, m, p, .. } = layout;
     let count = layout.loads();
-    let jump = |(loads, gains): (Range<usize>, Range<usize>)| {
+    let jump = |(log_rate, scale, loads, gains): (f64, f64, Range<usize>, Range<usize>)| {
         let mut effect = vec![0.0; p * loads.len()];
         for (row, c) in effect
             .chunks_exact_mut(loads.len().max(1))
@@ -120,18 +130,33 @@ fn jumps(layout: Layout, c: &[f64], g: &[f64], load_size: &[f64]) -> Vec<Jump> {
         {
             for (value, k) in row.iter_mut().zip(loads.clone()) {
                 let column = g.iter().skip(k).step_by(count);
-                *value = load_size[k] * c.iter().zip(column).map(|(c, g)| c * g).sum::<f64>();
+                *value =
+                    scale * load_size[k] * c.iter().zip(column).map(|(c, g)| c * g).sum::<f64>();
             }
         }
         let mut seen = vec![0.0; p * p];
         multiply_transposed(&mut seen, &effect, &effect, loads.len());
-        Jump { loads, gains, seen }
+        Jump {
+            log_rate,
+            scale,
+            loads,
+            gains,
+            seen,
+        }
     };
-    let each = (0..m).map(|j| (j..j + 1, j..j + 1));
-    let waves = (m..layout.state_load()).map(|j| (j..j + 1, 0..0));
-    let states = core::iter::once((layout.state_load()..count, 0..0));
-    let every = core::iter::once((0..count, 0..m));
-    let all = every.chain(each).chain(waves).chain(states);
+    let every = (tuning.everything * log_rate, 1.0, 0..count, 0..m);
+    let each = (0..m).map(|j| (log_rate, 1.0, j..j + 1, j..j + 1));
+    let waves = (m..layout.state_load()).map(|j| (log_rate, 1.0, j..j + 1, 0..0));
+    let several = tuning.several * log_rate;
+    let states = [
+        (several, 1.0),
+        (several + tuning.large_load_log_rate, tuning.large_load),
+    ];
+    let states = states.map(|(rate, scale)| (rate, scale, layout.state_load()..count, 0..0));
+    let all = core::iter::once(every)
+        .chain(each)
+        .chain(waves)
+        .chain(states);
     all.map(jump).collect()
 }
 
@@ -148,6 +173,7 @@ impl ModeModel {
         point: (&[f64], &[f64], &[f64]),
         (g, load_size, growth): (Vec<f64>, Vec<f64>, Vec<f64>),
         (bias, most): (Vec<f64>, Vec<f64>),
+        load_rate: (f64, &BankTuning),
         b_inverse: Vec<f64>,
     ) -> Self {
         let Layout { n, m, p, .. } = layout;
@@ -170,7 +196,7 @@ impl ModeModel {
                 *value -= c[i * n + j] * x0[j];
             }
         }
-        let jumps = jumps(layout, &c, &g, &load_size);
+        let jumps = jumps(layout, (&c, &g), &load_size, load_rate);
         let mut cb = vec![0.0; p * m];
         multiply(&mut cb, &c, &b, n);
         Self {

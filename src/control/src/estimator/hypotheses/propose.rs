@@ -139,12 +139,7 @@ impl Bank {
         };
         if parent.unlikely {
             for jump in 0..model.jumps.len() {
-                let together = match jump {
-                    0 => self.tuning.everything,
-                    _ if jump + 1 == model.jumps.len() => self.tuning.several,
-                    _ => 1.0,
-                };
-                consider(state, Action::Load(jump), together * log_rates.load);
+                consider(state, Action::Load(jump), model.jumps[jump].log_rate);
             }
             if !parent.loose {
                 consider(state, Action::Loosen, log_rates.changed);

@@ -138,6 +138,7 @@ fn model(
         (&mode.x0, &mode.u0, &mode.y0),
         loads,
         (bias, most),
+        (libm::log(settings.load_rate), tuning),
         inverse,
     )
 }
