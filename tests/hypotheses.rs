@@ -6,11 +6,12 @@ mod common;
 mod random_plants;
 
 use common::{Channel, REFERENCES, plant, reference, scenario, state_based};
-use ftc_control::{Controller, ControllerState};
+use ftc_control::{Controller, ControllerState, Delay};
 use ftc_design::Design;
 use ftc_plant::scenario::Waveform;
 use ftc_plant::{SwitchedPlant, TruePlant};
 use ftc_simulate::{PlantSimulator, Trajectory, Variant, run};
+use nalgebra::DVector;
 use proptest::prelude::*;
 use random_plants::RandomNumbers;
 
@@ -209,4 +210,37 @@ fn a_copy_is_a_snapshot() {
         tick(&controller, &mut copy, k, 0, &[0.3, f64::NAN]);
     }
     assert_eq!(state.command, copy.command);
+}
+
+/// Readings a sample late: once that is found, every reading that is a number is believed, and the model is not.
+#[test]
+fn the_readings_of_a_loop_with_another_delay_are_believed() {
+    let controller = Controller::new(state_based(Channel::State, 0.005)).unwrap();
+    let mut state = controller.initial_state(0);
+    let mode = &plant(Channel::State).modes[0];
+    let mut x = DVector::zeros(mode.a.nrows());
+    let (mut late, mut found_at) = (&mode.c * &x, None);
+    for k in 0..400u64 {
+        let mut y: Vec<f64> = late.iter().copied().collect();
+        if k >= 300 {
+            y[0] = if k % 2 == 0 { y[0] + 1.0 } else { f64::NAN };
+        }
+        let target = if k / 8 % 2 == 0 { 0.3 } else { -0.3 };
+        let reference = [target, -target];
+        let sample = controller.sample(k, 0, &y, &reference).unwrap();
+        controller.tick(&mut state, &sample);
+        let bank = state.bank.as_ref().unwrap();
+        match found_at {
+            None => found_at = controller.found_delay(&state).map(|delay| (k, delay)),
+            Some(_) => {
+                assert_eq!(bank.flagged, u64::from(y[0].is_nan()), "tick {k}");
+                assert!(!bank.model_valid, "tick {k}");
+                assert!(state.estimator.fault.iter().all(|&fault| fault == 0.0));
+            }
+        }
+        late = &mode.c * &x;
+        x = &mode.a * &x + &mode.b * DVector::from_column_slice(&state.command);
+    }
+    let found = found_at.expect("a delay is found");
+    assert!(found.0 < 300 && found.1 == Delay::Longer, "{found:?}");
 }

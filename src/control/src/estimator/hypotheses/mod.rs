@@ -591,6 +591,8 @@ impl BankState {
         for (q, &value) in y.iter().enumerate().take(Sensors::BITS as usize) {
             self.flagged |= Sensors::from(!is_measurement(value)) << q;
         }
+        let left = &self.seen[self.best].r;
+        self.residual.copy_from_slice(left);
         self.model_valid = false;
     }
 
