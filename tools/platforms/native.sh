@@ -1,20 +1,22 @@
 #!/usr/bin/env bash
-# Puts the FMU binaries of `make build` where the exporter looks first. Where they are those of the last time,
-# what is there stays, portable ones for instance, and counts as built anew.
+# Puts the FMU binaries of `make build` where the exporter of the program beside them looks first; of another
+# build, where its folder is given. Where they are those of the last time, what is there stays, portable ones
+# for instance, and counts as built anew.
 set -euo pipefail
 cd "$(dirname "$0")/../.."
 
+built=${1:-target/release}
 [ "$(uname -s)" = Linux ] || exit 0
 case $(uname -m) in
 x86_64) platform=linux64 ;;
 aarch64) platform=aarch64-linux ;;
 *) exit 0 ;;
 esac
-folder=target/release/fmu-binaries/$platform
-last=target/release/fmu-binaries/native
+folder=$built/fmu-binaries/$platform
+last=$built/fmu-binaries/native
 mkdir -p "$folder" "$last"
 for name in ftc_controller ftc_plant; do
-    library=target/release/lib${name}_fmu.so
+    library=$built/lib${name}_fmu.so
     # Tests build this library, too, with other features: the same sources may have been linked anew.
     if [ ! -f "$folder/$name.so" ] || ! cmp --silent "$library" "$last/$name.so"; then
         cp "$library" "$last/$name.so"

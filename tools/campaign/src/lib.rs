@@ -26,6 +26,7 @@ pub mod files;
 mod histogram;
 pub mod page;
 mod partial;
+#[cfg(feature = "parquet")]
 pub mod rows;
 mod run;
 mod statistics;

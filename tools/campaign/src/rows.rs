@@ -1,15 +1,20 @@
 //! One row per run, as a Parquet file.
 
 use crate::Outcome;
+use output::Replacement;
 use parquet::basic::{Compression, Repetition, Type as Physical};
 use parquet::data_type::{ByteArray, ByteArrayType, DoubleType, Int64Type};
-pub use parquet::errors::ParquetError as Error;
 use parquet::errors::ParquetError;
 use parquet::file::properties::WriterProperties;
 use parquet::file::writer::SerializedFileWriter;
 use parquet::schema::types::Type;
-use std::io::Write;
+use std::fs::File;
+use std::io::{self, Write};
+use std::path::Path;
 use std::sync::Arc;
+
+/// Name of the file with a row per run.
+pub const ROWS: &str = "runs.parquet";
 
 /// Columns in their order.
 const COLUMNS: [(&str, Physical); 12] = [
@@ -139,4 +144,66 @@ fn text(row: &Outcome, name: &str) -> String {
         return kinds.join(",");
     }
     serde_json::to_string(&row.faults).unwrap_or_default()
+}
+
+/// The file with a row per run, under another name until it is complete.
+pub struct RowFile {
+    writer: RowWriter<File>,
+    replacement: Replacement,
+}
+
+impl RowFile {
+    /// Begins a file in a directory, which is made where there is none.
+    ///
+    /// # Errors
+    /// One sentence that names the file.
+    pub fn new(out: &Path) -> Result<Self, output::Error> {
+        let target = &out.join(ROWS);
+        let made = std::fs::create_dir_all(out).and_then(|()| {
+            let replacement = Replacement::of(target)?;
+            Ok((replacement.file()?, replacement))
+        });
+        let (file, replacement) = made.map_err(|error| output::Error::of_file(target, &error))?;
+        let writer = RowWriter::new(file).map_err(|error| unwritten(target, error))?;
+        Ok(Self {
+            writer,
+            replacement,
+        })
+    }
+
+    /// Appends a row for each outcome.
+    ///
+    /// # Errors
+    /// One sentence that names the file.
+    pub fn write(&mut self, outcomes: &[Outcome]) -> Result<(), output::Error> {
+        self.writer
+            .write(outcomes)
+            .map_err(|error| unwritten(self.replacement.target(), error))
+    }
+
+    /// Ends the file and puts it in its place.
+    ///
+    /// # Errors
+    /// One sentence that names the file.
+    pub fn keep(self) -> Result<(), output::Error> {
+        let target = self.replacement.target().to_path_buf();
+        self.writer
+            .finish()
+            .map_err(|error| unwritten(&target, error))?;
+        self.replacement
+            .keep()
+            .map_err(|error| output::Error::of_file(&target, &error))
+    }
+}
+
+/// What the file system said, where the Parquet writer passes it on.
+fn unwritten(path: &Path, error: ParquetError) -> output::Error {
+    let error = match error {
+        ParquetError::External(error) => match error.downcast::<io::Error>() {
+            Ok(error) => *error,
+            Err(error) => io::Error::other(error),
+        },
+        error => io::Error::other(error),
+    };
+    output::Error::of_file(path, &error)
 }

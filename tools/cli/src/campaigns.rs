@@ -2,8 +2,9 @@
 
 use crate::failure::{number, option, whole};
 use crate::progress::{Progress, Runs};
+use crate::rows::{self, Rows};
 use crate::{check_output, failure::Failure};
-use campaign::files::{self, PAGE, RESULT, RowFile};
+use campaign::files::{self, PAGE, RESULT};
 use campaign::{Options, OptionsError, Partial, Watch};
 use clap::Args;
 use ftc_design::{Design, MOST_THREADS};
@@ -78,11 +79,21 @@ impl Arguments {
         &self.design
     }
 
-    /// Says what is wrong before anything is solved.
-    pub fn check(&self) -> Result<(), Failure> {
+    /// Says what is wrong before anything is solved, and reads the earlier results that are asked for, each
+    /// with the number of its runs.
+    pub fn begin(&self) -> Result<Vec<(Partial, u64)>, Failure> {
         check_output(&self.out)?;
-        let checked = self.options().check();
-        checked.map_err(misfit)
+        self.options().check().map_err(misfit)?;
+        rows::check(self.rows)?;
+        let read = |option, path: &Path, advice| {
+            files::read(path).map_err(|error| refused(option, format!("{error}{advice}")))
+        };
+        if self.resume {
+            let advice = ", or leave it out to begin anew";
+            return Ok(vec![read("--resume", &self.out.join(RESULT), advice)?]);
+        }
+        let parts = self.merge.iter();
+        parts.map(|path| read("--merge", path, "")).collect()
     }
 
     fn options(&self) -> Options {
@@ -116,10 +127,11 @@ fn refused(option: &str, what: impl std::fmt::Display) -> Failure {
     Failure::Input(format!("{option}: {what}"))
 }
 
-/// Does the campaign and returns what to print.
+/// Does the campaign, going on from what [`Arguments::begin`] found, and returns what to print.
 pub fn run(
     made: Made,
     arguments: &Arguments,
+    earlier: Vec<(Partial, u64)>,
     progress: Progress,
     quiet: bool,
 ) -> Result<String, Failure> {
@@ -133,8 +145,8 @@ pub fn run(
     drop(progress);
     let design = &made.design;
     let (whole, asked) = match arguments.merge.is_empty() {
-        true => work(design, arguments, quiet)?,
-        false => merge(design, arguments)?,
+        true => work(design, arguments, earlier, quiet)?,
+        false => merge(design, arguments, earlier)?,
     };
     files::write(&arguments.out, design, &whole, asked)?;
     let mut warnings = made.warnings;
@@ -155,14 +167,12 @@ fn replay(
     crate::simulate(made, &arguments.design, &arguments.out, false, progress)
 }
 
-/// Reads the results of shards and puts them together.
-fn merge(design: &Design, arguments: &Arguments) -> Result<(Partial, u64), Failure> {
-    let parts: Result<Vec<(Partial, u64)>, files::Error> = arguments
-        .merge
-        .iter()
-        .map(|path| files::read(path))
-        .collect();
-    let parts = parts.map_err(|error| refused("--merge", error))?;
+/// Puts the results of shards together.
+fn merge(
+    design: &Design,
+    arguments: &Arguments,
+    parts: Vec<(Partial, u64)>,
+) -> Result<(Partial, u64), Failure> {
     let (parts, asked): (Vec<Partial>, Vec<u64>) = parts.into_iter().unzip();
     let together = asked.into_iter().fold(0, u64::saturating_add);
     let whole = campaign::merge(parts).map_err(|error| refused("--merge", error))?;
@@ -179,17 +189,16 @@ fn merge(design: &Design, arguments: &Arguments) -> Result<(Partial, u64), Failu
 }
 
 /// Does the runs that are missing.
-fn work(design: &Design, arguments: &Arguments, quiet: bool) -> Result<(Partial, u64), Failure> {
+fn work(
+    design: &Design,
+    arguments: &Arguments,
+    earlier: Vec<(Partial, u64)>,
+    quiet: bool,
+) -> Result<(Partial, u64), Failure> {
     let options = arguments.options();
     let mut whole = Partial::new(design, &options);
     let mut asked = None;
-    if arguments.resume {
-        let (before, runs) = files::read(&arguments.out.join(RESULT)).map_err(|error| {
-            refused(
-                "--resume",
-                format!("{error}, or leave it out to begin anew"),
-            )
-        })?;
+    for (before, runs) in earlier {
         asked = Some(runs);
         whole = campaign::merge([whole, before]).map_err(|error| refused("--resume", error))?;
     }
@@ -200,10 +209,7 @@ fn work(design: &Design, arguments: &Arguments, quiet: bool) -> Result<(Partial,
     let count = missing.iter().map(|range| range.end - range.start).sum();
     let pool = crate::pool("--jobs", arguments.jobs.map_or(0, usize::from))?;
     let unwritten = |error: output::Error| Failure::Input(error.to_string());
-    let mut rows = match arguments.rows {
-        true => Some(RowFile::new(&arguments.out).map_err(unwritten)?),
-        false => None,
-    };
+    let mut rows = Rows::begin(arguments.rows, &arguments.out).map_err(unwritten)?;
     let whole = std::thread::scope(|scope| {
         let _shown = Runs::show(scope, Arc::clone(&watch), count, quiet);
         pool.install(|| {
@@ -212,14 +218,12 @@ fn work(design: &Design, arguments: &Arguments, quiet: bool) -> Result<(Partial,
                 (design, &options),
                 range.clone(),
                 &watch,
-                |outcomes| rows.as_mut().map_or(Ok(()), |rows| rows.write(outcomes)),
+                |outcomes| rows.write(outcomes),
             )
         })
     });
     let whole = whole.map_err(unwritten)?;
-    if let Some(rows) = rows {
-        rows.keep().map_err(unwritten)?;
-    }
+    rows.keep().map_err(unwritten)?;
     Ok((whole, range.end - range.start))
 }
 

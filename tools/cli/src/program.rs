@@ -18,6 +18,7 @@ mod failure;
 mod identification;
 mod interrupt;
 mod progress;
+mod rows;
 
 use clap::{Parser, Subcommand, ValueEnum};
 use design_file::{Loaded, examples};
@@ -252,6 +253,11 @@ pub fn main(
     let arguments = match Arguments::try_parse_from(arguments) {
         Ok(arguments) => arguments,
         Err(error) => {
+            use clap::error::ErrorKind::DisplayHelpOnMissingArgumentOrSubcommand as Bare;
+            if error.use_stderr() && error.kind() != Bare {
+                eprintln!("{}", one_line(&error.render().to_string()));
+                return INPUT;
+            }
             // Help and version are no errors; to whom they go, clap knows.
             let printed = error.print();
             return match (error.exit_code(), printed) {
@@ -348,9 +354,9 @@ fn run(
             simulate(made, design, out, *baselines, &progress)
         }
         Command::Campaign(campaign) => {
-            campaign.check()?;
+            let earlier = campaign.begin()?;
             let made = solve(campaign.design(), &asked(None, None), &progress)?;
-            campaigns::run(made, campaign, progress, arguments.quiet)
+            campaigns::run(made, campaign, earlier, progress, arguments.quiet)
         }
         Command::Identify(asked) => {
             let (folder, name) = asked.target();
@@ -636,6 +642,23 @@ fn print(text: &str) -> std::io::Result<()> {
         Err(error) if error.kind() == std::io::ErrorKind::BrokenPipe => Ok(()),
         result => result,
     }
+}
+
+/// What clap says of a command line that does not fit, in one line and without the usage.
+fn one_line(said: &str) -> String {
+    let ends = |line: &str| line.starts_with("Usage:") || line.starts_with("For more information");
+    let mut sentence = String::new();
+    for line in said.lines().map(str::trim).take_while(|line| !ends(line)) {
+        let joined = match line {
+            "" => continue,
+            _ if sentence.is_empty() => "",
+            tip if tip.starts_with("tip:") => "; ",
+            _ if sentence.ends_with(':') || line.starts_with('[') => " ",
+            _ => ", ",
+        };
+        sentence = sentence + joined + line;
+    }
+    sentence + "; see --help"
 }
 
 /// What the reader of standard output asked for is lost.

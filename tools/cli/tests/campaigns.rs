@@ -5,7 +5,7 @@
 
 mod common;
 
-use common::{Bench, FILE, SOUND};
+use common::{Bench, FILE, SOUND, damaged};
 use std::fs;
 
 /// Runs `campaign` with these arguments, which must go well; returns what it prints.
@@ -40,6 +40,18 @@ fn shards_are_merged_without_saying_again_how_many_runs_there_are() {
     let said = campaign(&bench, &less);
     let words = "warning: 9 of 14 runs were done: merge the other shards, too";
     assert!(said.contains(words), "{said}");
+}
+
+#[test]
+fn an_earlier_result_that_cannot_be_read_is_refused_before_anything_is_solved() {
+    // Were it solved first, the sentence would be that of a design with no solution.
+    let infeasible = damaged("decay = 0.7\noutput", "decay = 0.001\noutput");
+    let bench = Bench::new(infeasible.replace("latency = 0", "latency = 1"));
+    for option in [&["--resume"][..], &["--merge", "none.json"]] {
+        let run = bench.run(&[&["campaign", FILE, "--out", "part"], option].concat());
+        assert_eq!(run.code(), 2, "{}", run.stderr());
+        assert!(run.stderr().contains(option[0]), "{}", run.stderr());
+    }
 }
 
 #[test]

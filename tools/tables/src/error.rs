@@ -278,6 +278,12 @@ pub enum MatrixError {
          save it with save(...) in MATLAB, scipy.io.savemat or numpy.savez"
     )]
     Format,
+    /// The crate was built without its feature `formats`.
+    #[error(
+        "is not read by this build, which leaves MATLAB and NumPy files out: build with `make build`, \
+         or with cargo's feature `formats`"
+    )]
+    NotBuilt,
     /// More arrays than are read.
     #[error("has {0} entries: keep to the matrices of the model")]
     TooManyArrays(usize),

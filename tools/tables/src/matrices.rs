@@ -2,9 +2,11 @@
 //!
 //! Every real array is found under its name, a field of a structure under `structure.field`.
 
-mod archive;
-mod hdf5;
-mod level5;
+#[cfg(feature = "formats")]
+mod formats;
+
+#[cfg(feature = "formats")]
+use formats::parse;
 
 use crate::silent::caught;
 use crate::{EntryError, Error, MatrixError, quote, read_regular};
@@ -14,10 +16,6 @@ use std::path::Path;
 
 /// The most bytes of a file that are read: matrices of control models are small.
 const MOST_BYTES: u64 = 64 << 20;
-/// The most entries of an array that is taken for a matrix.
-const MOST_ENTRIES: usize = 1 << 20;
-/// How deep structures may be nested.
-const DEEPEST: usize = 8;
 
 /// What a file holds under a name: a matrix, or why it is none.
 type Found = BTreeMap<String, Result<DMatrix<f64>, EntryError>>;
@@ -72,45 +70,21 @@ impl Matrices {
     }
 }
 
-fn parse(bytes: Vec<u8>) -> Result<Found, Error> {
-    if bytes.starts_with(b"PK") {
-        return archive::read(bytes);
-    }
-    if hdf5_pure::is_hdf5_bytes(&bytes) {
-        return hdf5::read(bytes);
-    }
-    if bytes.starts_with(b"MATLAB 5.0") || bytes.get(126..128).is_some_and(is_level5_mark) {
-        return level5::read(&bytes);
-    }
-    if bytes.starts_with(b"\x93NUMPY") {
-        return Err(MatrixError::SingleArray.into());
-    }
-    Err(MatrixError::Format.into())
+/// Without the readers, every file is refused.
+#[cfg(not(feature = "formats"))]
+fn parse(_: Vec<u8>) -> Result<Found, Error> {
+    Err(MatrixError::NotBuilt.into())
 }
 
-/// The byte order mark that ends the header of a level 5 file.
-fn is_level5_mark(mark: &[u8]) -> bool {
-    mark == b"IM" || mark == b"MI"
-}
+#[cfg(all(test, not(feature = "formats")))]
+mod tests {
+    use super::Matrices;
 
-/// A matrix from its entries column by column, if it is one.
-fn from_columns(shape: &[usize], entries: &[f64]) -> Result<DMatrix<f64>, EntryError> {
-    check_shape(shape)?;
-    match *shape {
-        [rows, columns] if rows * columns == entries.len() => {
-            Ok(DMatrix::from_column_slice(rows, columns, entries))
-        }
-        _ => Err(EntryError::Damaged),
-    }
-}
-
-/// Says why an array of this shape is no matrix.
-fn check_shape(shape: &[usize]) -> Result<(), EntryError> {
-    let entries = shape.iter().try_fold(1usize, |all, &n| all.checked_mul(n));
-    match shape.len() {
-        2 if entries.is_some_and(|n| n <= MOST_ENTRIES) => Ok(()),
-        2 => Err(EntryError::TooLarge(shape.to_vec())),
-        0 | 1 => Err(EntryError::OneDimension(shape.to_vec())),
-        _ => Err(EntryError::Dimensions(shape.to_vec())),
+    #[test]
+    fn a_build_without_the_readers_says_how_to_get_them() {
+        let file = tempfile::NamedTempFile::new().expect("a file");
+        std::fs::write(file.path(), b"MATLAB 5.0 MAT-file").expect("written");
+        let refused = Matrices::read(file.path()).expect_err("nothing can read it");
+        assert!(refused.to_string().contains("build with `make build`"));
     }
 }
