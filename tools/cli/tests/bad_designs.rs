@@ -1136,6 +1136,46 @@ fn a_command_line_without_sense() {
 
 /// A number of the command line is told with its option and what to give.
 #[test]
+fn a_command_line_that_does_not_fit_is_refused_in_one_line() {
+    let bench = Bench::new(SOUND);
+    let cases: [(&[&str], &str); 7] = [
+        (&["design"], "were not provided: <DESIGN>; see --help"),
+        (
+            &["desing", FILE],
+            "; tip: a similar subcommand exists: 'design'",
+        ),
+        (
+            &["design", FILE, "--out", "x"],
+            "unexpected argument '--out' found",
+        ),
+        (&["design", FILE, FILE], "unexpected argument"),
+        (
+            &["design", FILE, "--solver", "x"],
+            "[possible values: structured, clarabel]",
+        ),
+        (
+            &["simulate", FILE],
+            "were not provided: --out <DIR>; see --help",
+        ),
+        (
+            &["campaign", FILE, "--out", "x", "--rows", "--resume"],
+            "cannot be used with",
+        ),
+    ];
+    for (given, words) in cases {
+        let run = bench.run(given);
+        let said = run.stderr();
+        assert_eq!(run.code(), 2, "{given:?}: {said}");
+        assert_eq!(said.lines().count(), 1, "{given:?}: {said}");
+        assert!(
+            said.starts_with("error: ") && said.contains(words),
+            "{given:?}: {said}"
+        );
+    }
+    assert_eq!(bench.files(), [FILE]);
+}
+
+#[test]
 fn numbers_of_the_command_line() {
     let bench = Bench::new(SOUND);
     let campaign = ["campaign", FILE, "--out", "out"];
