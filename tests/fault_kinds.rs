@@ -5,26 +5,11 @@
 
 mod common;
 
-use common::{Channel, controller, plant, reference, scenario};
+use common::{Channel, KINDS, controller, plant, reference, scenario};
 use ftc_control::Controller;
 use ftc_plant::scenario::{FaultEvent, FaultKind, Waveform};
 use ftc_simulate::{PlantSimulator, Trajectory, Variant, run};
 use nalgebra::DVector;
-
-const KINDS: &[(&str, FaultKind)] = &[
-    ("bias", FaultKind::Bias { size: 0.5 }),
-    ("drift", FaultKind::Drift { slope: 0.004 }),
-    ("gain loss", FaultKind::GainLoss { loss: 0.6 }),
-    ("stuck", FaultKind::Stuck),
-    (
-        "intermittent",
-        FaultKind::Intermittent {
-            size: 0.4,
-            period: 30.0,
-        },
-    ),
-    ("dropout", FaultKind::Dropout),
-];
 
 /// `(what, from, until)`: modes switch at 800, and the estimator then holds for 25 samples.
 const WINDOWS: [(&str, f64, f64); 4] = [

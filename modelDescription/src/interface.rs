@@ -8,6 +8,7 @@
 
 use crate::units::display_unit;
 use crate::{Causality, Kind, Role, Span, Variability, Variable, VariableTable};
+use ftc_plant::scenario::InjectedKind;
 
 /// What the user says about a signal.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -298,8 +299,6 @@ pub fn plant(interface: &Interface) -> VariableTable {
 
 /// An end in seconds that no run reaches.
 const NEVER: f64 = 1e12;
-/// The number of the last kind of injected fault.
-const LAST_KIND: i32 = 6;
 
 /// Tunable parameters that put a fault on each sensor while the plant runs: kind, size, begin, end.
 fn injected(table: &mut VariableTable, outputs: &[SignalInfo]) -> [Span; 4] {
@@ -314,12 +313,15 @@ fn injected(table: &mut VariableTable, outputs: &[SignalInfo]) -> [Span; 4] {
     };
     let kind = Kind::Integer {
         min: Some(0),
-        max: Some(LAST_KIND),
+        max: Some(InjectedKind::LAST),
     };
-    let kinds = "0 none, 1 bias, 2 drift, 3 gain, 4 stuck, 5 dropout, 6 noise";
+    let numbered = InjectedKind::ALL.iter().zip(1..);
+    let kinds = numbered.fold(String::from("0 none"), |text, ((_, name), number)| {
+        format!("{text}, {number} {name}")
+    });
     let of_size = "its bias, slope per second, lost fraction or standard deviation";
     [
-        ("kind", Role::InjectedKind, kind, kinds, 0.0),
+        ("kind", Role::InjectedKind, kind, kinds.as_str(), 0.0),
         ("size", Role::InjectedSize, number(None), of_size, 0.0),
         (
             "from",

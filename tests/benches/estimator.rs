@@ -69,7 +69,7 @@ fn table(seed: u64) {
         row(fault.name(), &costs);
         abrupt.extend(costs);
     }
-    for fault in [Fault::Stuck, Fault::Drift] {
+    for fault in Fault::SLOW {
         row(fault.name(), &bench.runs(None, Some(fault)));
     }
     for change in Change::ALL {

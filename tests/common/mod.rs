@@ -11,9 +11,25 @@ use ftc_design::{
     ControllerDesign, HypothesesSpec, Signal, Signals, commissioning, mode_models, plain,
 };
 use ftc_plant::Scenario;
-use ftc_plant::scenario::{ModeInterval, Waveform};
+use ftc_plant::scenario::{FaultKind, ModeInterval, Waveform};
 use ftc_plant::{Dimensions, Mode, SwitchedPlant};
 use nalgebra::{DMatrix, dmatrix};
+
+/// A fault of each kind, for the example under `levels`.
+pub const KINDS: &[(&str, FaultKind)] = &[
+    ("bias", FaultKind::Bias { size: 0.5 }),
+    ("drift", FaultKind::Drift { slope: 0.004 }),
+    ("gain loss", FaultKind::GainLoss { loss: 0.6 }),
+    ("stuck", FaultKind::Stuck),
+    (
+        "intermittent",
+        FaultKind::Intermittent {
+            size: 0.4,
+            period: 30.0,
+        },
+    ),
+    ("dropout", FaultKind::Dropout),
+];
 
 /// Where the disturbance enters.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -27,17 +27,12 @@ import commands
 SOURCE = commands.ROOT / "tests" / "c" / "closed_loop.c"
 FLAGS = ["-std=c11", "-Wall", "-Wextra", "-O1"]
 ZIG = commands.ROOT / "target" / "platforms" / "zig" / "bin" / "python"
+MINGW = ["x86_64-w64-mingw32-gcc", "-D__USE_MINGW_ANSI_STDIO=1"]
 WINE = shutil.which("wine64") or "/usr/lib/wine/wine64"
 STEPS = 1600
 
-COMPILERS = {
-    "linux64": ["cc"],
-    "win64": ["x86_64-w64-mingw32-gcc", "-D__USE_MINGW_ANSI_STDIO=1"],
-    "aarch64-linux": [ZIG, "-m", "ziglang", "cc", "-target", "aarch64-linux-gnu.2.17"],
-}
-LIBRARIES = {"linux64": ["-ldl"], "win64": [], "aarch64-linux": ["-ldl"]}
-# What runs another processor's programs, and that processor's name in Debian.
-EMULATORS = {"aarch64-linux": ("qemu-aarch64", "arm64")}
+# Linux on other processors: zig's target, what runs its programs, and the processor's name in Debian.
+EMULATED = {"aarch64-linux": ("aarch64-linux-gnu.2.17", "qemu-aarch64", "arm64")}
 
 
 def system_of(platform: str) -> list[str | Path]:
@@ -46,7 +41,7 @@ def system_of(platform: str) -> list[str | Path]:
         return []
     if platform == "win64":
         return [WINE]
-    emulator, architecture = EMULATORS[platform]
+    _, emulator, architecture = EMULATED[platform]
     root = subprocess.run(
         [commands.ROOT / "tools" / "platforms" / "system.sh", architecture],
         check=True,
@@ -54,6 +49,18 @@ def system_of(platform: str) -> list[str | Path]:
         text=True,
     ).stdout.strip()
     return [emulator, "-L", root]
+
+
+def compile_for(platform: str, program: Path) -> None:
+    """Compiles the C program that closes the loop."""
+    libraries = ["-ldl"]
+    if platform == "linux64":
+        compiler = ["cc"]
+    elif platform == "win64":
+        compiler, libraries = MINGW, []
+    else:
+        compiler = [ZIG, "-m", "ziglang", "cc", "-target", EMULATED[platform][0]]
+    subprocess.run([*compiler, *FLAGS, "-o", program, SOURCE, *libraries], check=True)
 
 
 def uri(folder: Path, platform: str) -> str:
@@ -64,12 +71,10 @@ def uri(folder: Path, platform: str) -> str:
 def run(platform: str, fmus: commands.Exported, folder: Path) -> tuple[str, float]:
     """Runs the loop on a platform and returns what it printed and the seconds it took."""
     program = folder / f"closed_loop_{platform}.exe"
-    subprocess.run([*COMPILERS[platform], *FLAGS, "-o", program, SOURCE, *LIBRARIES[platform]], check=True)
+    compile_for(platform, program)
     if platform == "win64":
         prng = Path(__file__).with_name("bcryptprimitives.c")
-        subprocess.run(
-            [*COMPILERS[platform], "-shared", "-o", folder / "bcryptprimitives.dll", prng, "-ladvapi32"], check=True
-        )
+        subprocess.run([*MINGW, "-shared", "-o", folder / "bcryptprimitives.dll", prng, "-ladvapi32"], check=True)
     sides, arguments = {}, []
     for side, fmu in (("c", fmus.controller), ("p", fmus.plant)):
         unpacked = folder / f"{platform}_{side}"

@@ -78,6 +78,7 @@ pub enum Fault {
 }
 
 impl Fault {
+    /// Seen in the first samples.
     pub const ABRUPT: [Self; 6] = [
         Self::Bias,
         Self::AtSwitch,
@@ -86,6 +87,8 @@ impl Fault {
         Self::GainLoss,
         Self::Intermittent,
     ];
+    /// The others.
+    pub const SLOW: [Self; 2] = [Self::Stuck, Self::Drift];
 
     pub const fn name(self) -> &'static str {
         match self {

@@ -1,10 +1,10 @@
 #!/usr/bin/env bash
 # Builds the FMU binaries of the named platforms, one after the other:
 #
-#     tools/platforms/build.sh linux64 win64 aarch64-linux
+#     tools/platforms/build.sh PLATFORM...
 #
 # into target/release/fmu-binaries/PLATFORM, where `ftc-fmu export` finds them.
-# linux64 and aarch64-linux need cargo-zigbuild (requirements.txt) on the path, win64 mingw-w64.
+# Those of Linux need cargo-zigbuild (requirements.txt) on the path, win64 mingw-w64.
 # A Rust toolchain that has the platform's standard library is used as it is; else Debian's is
 # unpacked under target/platforms (see toolchain.sh), and the standard library of win64 is built.
 set -euo pipefail

@@ -9,8 +9,7 @@ built=${1:-target/release}
 [ "$(uname -s)" = Linux ] || exit 0
 case $(uname -m) in
 x86_64) platform=linux64 ;;
-aarch64) platform=aarch64-linux ;;
-*) exit 0 ;;
+*) platform=$(uname -m)-linux ;;
 esac
 folder=$built/fmu-binaries/$platform
 last=$built/fmu-binaries/native

@@ -2,7 +2,7 @@
 # Builds the wheel into dist/: the Python package, the command line, and FMU binaries of the named
 # platforms, which must have been built into target/release/fmu-binaries:
 #
-#     tools/python/build.sh linux64 win64 aarch64-linux
+#     tools/python/build.sh PLATFORM...
 #
 # For another machine than this one: TARGET=aarch64-unknown-linux-gnu, by Debian's Rust where the present one
 # lacks its standard library (tools/platforms/toolchain.sh). Needs maturin and ziglang (requirements.txt) on the

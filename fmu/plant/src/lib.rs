@@ -10,7 +10,7 @@ use fmu_abi::{
     Readiness, Refusal, Slave, Values, nearest_mode, require_finite, resource, selected_mode,
 };
 use ftc_simulate::integrate::Stalled;
-use ftc_simulate::plant::{Change, External, Injected, LAST_INJECTED_KIND};
+use ftc_simulate::plant::{Change, External, Injected, InjectedKind};
 use ftc_simulate::{PlantSimulator, PlantState};
 use model_description::{DESIGN_FILE, Interface, PLANT, Role, Span, VariableTable};
 use std::path::Path;
@@ -132,7 +132,7 @@ impl PlantFmu {
             require_finite(&self.table, values, span)?;
         }
         let mut kinds = values.get(self.spans.injected[0]).iter().enumerate();
-        let last = f64::from(LAST_INJECTED_KIND);
+        let last = f64::from(InjectedKind::LAST);
         match kinds.find(|(_, kind)| !(0.0..=last).contains(*kind)) {
             Some((at, kind)) => Err(Refusal::from(format!(
                 "inject_kind[{}] is {kind}: give a kind from 0 to {last}",

@@ -141,6 +141,49 @@ pub enum FaultKind {
     Dropout,
 }
 
+/// What an importer may do to a reading while the plant FMU runs; its number is its place in `ALL`, from 1 on.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[expect(
+    clippy::exhaustive_enums,
+    reason = "a new kind must be simulated everywhere: the compiler says where"
+)]
+pub enum InjectedKind {
+    /// `y + size`.
+    Bias,
+    /// `y + size (t - from)`.
+    Drift,
+    /// `(1 - size) y`.
+    Gain,
+    /// The last reading before.
+    Stuck,
+    /// Not a number.
+    Dropout,
+    /// `y + size n`, `n` standard normal.
+    Noise,
+}
+
+impl InjectedKind {
+    /// All of them, each with its name, in the order of their numbers.
+    pub const ALL: [(Self, &'static str); 6] = [
+        (Self::Bias, "bias"),
+        (Self::Drift, "drift"),
+        (Self::Gain, "gain"),
+        (Self::Stuck, "stuck"),
+        (Self::Dropout, "dropout"),
+        (Self::Noise, "noise"),
+    ];
+
+    /// The number of the last one.
+    pub const LAST: i32 = Self::ALL.len() as i32;
+
+    /// The one with this number.
+    pub fn of(number: f64) -> Option<Self> {
+        // A conversion rounds towards zero, and what is no number becomes zero.
+        let at = (number as usize).checked_sub(1)?;
+        Self::ALL.get(at).map(|(kind, _)| *kind)
+    }
+}
+
 /// The first tick at or after `time` seconds; a time that is a whole number of samples but for rounding counts as one.
 pub fn first_tick(time: f64, sample_time: f64) -> u64 {
     let ticks = time / sample_time - 1e-9;
@@ -279,6 +322,13 @@ mod tests {
                 );
             }
         }
+    }
+
+    #[test]
+    fn an_injected_kind_is_found_by_its_number() {
+        let kinds = [0.0, 1.0, 6.0, 7.0, -1.0, f64::NAN].map(InjectedKind::of);
+        let (first, last) = (Some(InjectedKind::Bias), Some(InjectedKind::Noise));
+        assert_eq!(kinds, [None, first, last, None, None, None]);
     }
 
     #[test]

@@ -9,7 +9,8 @@ mod rectifier;
 mod schedule;
 
 pub use derivative::Change;
-pub use injection::{Injected, LAST_INJECTED_KIND};
+pub use ftc_plant::scenario::InjectedKind;
+pub use injection::Injected;
 
 use super::integrate::Stalled;
 use departed::Departed;

@@ -4,6 +4,7 @@
 mod common;
 
 use common::{Bench, FILE, Outcome, SOUND, installed, unzip};
+use package::platform::HOST as HERE;
 use serde_json::Value;
 use std::collections::BTreeMap;
 use std::fs;
@@ -15,14 +16,13 @@ const DESIGN: &str = "resources/design.cbor";
 const CERTIFICATE: &str = "resources/certificate.json";
 const DESCRIPTION: &str = "modelDescription.xml";
 
-/// The platform of this machine, and another.
-const PLATFORMS: [&str; 2] = if cfg!(target_arch = "aarch64") {
-    ["aarch64-linux", "linux64"]
+/// Another platform than this machine's, and the number by which an ELF file names its processor.
+const OTHER: (&str, u8) = if cfg!(target_arch = "aarch64") {
+    ("linux64", 0x3E)
 } else {
-    ["linux64", "aarch64-linux"]
+    ("aarch64-linux", 0xB7)
 };
-const HERE: &str = PLATFORMS[0];
-const ELSEWHERE: &str = PLATFORMS[1];
+const ELSEWHERE: &str = OTHER.0;
 
 /// A library for this machine that offers what an importer needs, and does nothing.
 fn library() -> &'static [u8] {
@@ -604,12 +604,7 @@ fn a_binary_that_does_something_else_is_found_out() {
     let own = format!("binaries/{HERE}/sound_controller.so");
     let other = format!("binaries/{ELSEWHERE}/sound_controller.so");
     let mut bytes = elsewhere.files.remove(&own).unwrap();
-    // The machine an ELF file is for: x86-64 or aarch64.
-    bytes[18..20].copy_from_slice(if HERE == "linux64" {
-        &[0xB7, 0]
-    } else {
-        &[0x3E, 0]
-    });
+    bytes[18..20].copy_from_slice(&[OTHER.1, 0]);
     elsewhere.files.insert(other, bytes);
     let (code, said) = elsewhere.says(&[]);
     assert_eq!(code, 0, "{said}");

@@ -2,7 +2,7 @@
 //! and run beside this program's own controller, from the same design and signals.
 
 use crate::Error;
-use crate::export::HOST;
+use crate::platform::HOST;
 use crate::verify::{Fmu, Refusal};
 use fmu_abi::Values;
 use fmu_abi::types::{

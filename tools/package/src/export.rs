@@ -3,7 +3,7 @@
 use crate::Error;
 use crate::archive::{self, Contents};
 use crate::certificate::{self, Certificate};
-use crate::platform::{PLATFORMS, Platform};
+use crate::platform::{HOST, PLATFORMS, Platform};
 use crate::signature::SigningKey;
 use crate::ssp::{self, Component, System};
 use ftc_design::{Design, Proof};
@@ -47,15 +47,6 @@ pub(crate) const KINDS: [Kind; 2] = [
         table: model_description::plant,
     },
 ];
-
-/// The platform of this machine.
-pub(crate) const HOST: &str = if cfg!(target_os = "windows") {
-    "win64"
-} else if cfg!(target_arch = "aarch64") {
-    "aarch64-linux"
-} else {
-    "linux64"
-};
 
 /// Licence texts and notices of all that the binaries link, gathered when this program is built.
 const LICENSES: &str = include_str!(concat!(env!("OUT_DIR"), "/licenses.txt"));

@@ -23,6 +23,8 @@ pub struct Platform {
     pub name: &'static str,
     /// Extension of its shared libraries.
     pub extension: &'static str,
+    /// Whether this program is for it.
+    here: bool,
     format: BinaryFormat,
     architecture: Architecture,
 }
@@ -32,22 +34,37 @@ pub const PLATFORMS: &[Platform] = &[
     Platform {
         name: "linux64",
         extension: "so",
+        here: cfg!(all(target_os = "linux", target_arch = "x86_64")),
         format: BinaryFormat::Elf,
         architecture: Architecture::X86_64,
     },
     Platform {
         name: "win64",
         extension: "dll",
+        here: cfg!(all(windows, target_arch = "x86_64")),
         format: BinaryFormat::Pe,
         architecture: Architecture::X86_64,
     },
     Platform {
         name: "aarch64-linux",
         extension: "so",
+        here: cfg!(all(target_os = "linux", target_arch = "aarch64")),
         format: BinaryFormat::Elf,
         architecture: Architecture::Aarch64,
     },
 ];
+
+/// The name of the platform of this machine.
+pub const HOST: &str = {
+    let (mut name, mut at) = ("this machine", 0);
+    while at < PLATFORMS.len() {
+        if PLATFORMS[at].here {
+            name = PLATFORMS[at].name;
+        }
+        at += 1;
+    }
+    name
+};
 
 /// Functions without which no importer closes a loop.
 const NEEDED: [&str; 10] = [

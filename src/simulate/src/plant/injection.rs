@@ -2,7 +2,7 @@
 
 use super::{PlantSimulator, PlantState};
 use ftc_plant::noise;
-use ftc_plant::scenario::first_tick;
+use ftc_plant::scenario::{InjectedKind, first_tick};
 
 /// Keeps injected noise apart from that of the scenario.
 const OTHER_SEED: u64 = 0x5eed_0f1a_7e57_ab1e;
@@ -14,52 +14,14 @@ const OTHER_SEED: u64 = 0x5eed_0f1a_7e57_ab1e;
     reason = "the four parameters of an injected fault"
 )]
 pub struct Injected<'a> {
-    /// What happens to the reading, by number:
-    ///
-    /// | kind | reading |
-    /// |---|---|
-    /// | 0 | as it is |
-    /// | 1 | bias: `y + size` |
-    /// | 2 | drift: `y + size (t - from)` |
-    /// | 3 | gain: `(1 - size) y` |
-    /// | 4 | stuck: the last reading before |
-    /// | 5 | dropout: not a number |
-    /// | 6 | noise: `y + size n`, `n` standard normal |
+    /// Number of the [`InjectedKind`]; 0: none.
     pub kind: &'a [f64],
-    /// Size, in the units above.
+    /// Size, in the units of the kind.
     pub size: &'a [f64],
     /// First instant in seconds.
     pub from: &'a [f64],
     /// End in seconds.
     pub until: &'a [f64],
-}
-
-/// The kinds with a number.
-#[derive(Clone, Copy, PartialEq)]
-enum Kind {
-    Bias,
-    Drift,
-    Gain,
-    Stuck,
-    Dropout,
-    Noise,
-}
-
-/// The number of the last kind.
-pub const LAST_INJECTED_KIND: i32 = 6;
-
-impl Kind {
-    fn of(number: f64) -> Option<Self> {
-        match number as i64 {
-            1 => Some(Self::Bias),
-            2 => Some(Self::Drift),
-            3 => Some(Self::Gain),
-            4 => Some(Self::Stuck),
-            5 => Some(Self::Dropout),
-            6 => Some(Self::Noise),
-            _ => None,
-        }
-    }
 }
 
 impl Injected<'_> {
@@ -68,12 +30,12 @@ impl Injected<'_> {
         &self,
         tick: u64,
         sample_time: f64,
-    ) -> impl Iterator<Item = Option<(Kind, f64, f64)>> {
+    ) -> impl Iterator<Item = Option<(InjectedKind, f64, f64)>> {
         let times = self.from.iter().zip(self.until);
         let faults = self.kind.iter().zip(self.size).zip(times);
         faults.map(move |((&kind, &size), (&from, &until))| {
             let within = first_tick(from, sample_time)..first_tick(until, sample_time);
-            let kind = Kind::of(kind).filter(|_| within.contains(&tick))?;
+            let kind = InjectedKind::of(kind).filter(|_| within.contains(&tick))?;
             Some((kind, size, from))
         })
     }
@@ -93,7 +55,8 @@ impl PlantSimulator {
     fn inject_some(&self, state: &mut PlantState, injected: &Injected<'_>) {
         let te = self.plant.sample_time;
         let departed = &mut state.departed;
-        if injected.kind.contains(&f64::from(LAST_INJECTED_KIND)) {
+        let noisy = |&kind: &f64| InjectedKind::of(kind) == Some(InjectedKind::Noise);
+        if injected.kind.iter().any(noisy) {
             let seed = self.scenario.seed ^ OTHER_SEED;
             noise::standard_normal(seed, state.tick, &mut departed.draws);
         }
@@ -107,12 +70,12 @@ impl PlantSimulator {
             };
             let before = *y;
             *y = match kind {
-                Kind::Bias => before + size,
-                Kind::Drift => before + size * (state.tick as f64 * te - from),
-                Kind::Gain => (1.0 - size) * before,
-                Kind::Stuck => *held,
-                Kind::Dropout => f64::NAN,
-                Kind::Noise => before + size * draw,
+                InjectedKind::Bias => before + size,
+                InjectedKind::Drift => before + size * (state.tick as f64 * te - from),
+                InjectedKind::Gain => (1.0 - size) * before,
+                InjectedKind::Stuck => *held,
+                InjectedKind::Dropout => f64::NAN,
+                InjectedKind::Noise => before + size * draw,
             };
             let change = *y - before;
             *fault = if change.is_finite() {
@@ -133,16 +96,16 @@ impl PlantSimulator {
             };
             let before = *y;
             match kind {
-                Kind::Bias | Kind::Drift | Kind::Noise => {}
-                Kind::Gain => {
+                InjectedKind::Bias | InjectedKind::Drift | InjectedKind::Noise => {}
+                InjectedKind::Gain => {
                     *y *= 1.0 - size;
                     *fault += *y - before;
                 }
-                Kind::Stuck => {
+                InjectedKind::Stuck => {
                     *y = 0.0;
                     *fault -= before;
                 }
-                Kind::Dropout => (*y, *fault) = (0.0, 0.0),
+                InjectedKind::Dropout => (*y, *fault) = (0.0, 0.0),
             }
         }
     }
