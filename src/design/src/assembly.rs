@@ -1,10 +1,11 @@
 //! From what is asked for to a finished design: gains, observer, predictor, thresholds, record.
 
 use super::commissioning::{self, Database, RecordedDisturbance};
+pub use super::estimator_spec::{DatabaseSource, EstimatorSpec, LONGEST_DEBOUNCE, Threshold};
 use super::grey_box::{self, Fit, Unusable};
 use super::harmonics;
 pub use super::harmonics::KnownDisturbance;
-use super::hypotheses::{self, HypothesesSpec};
+use super::hypotheses;
 use super::{
     CertificateError, ControlSpec, ControllerDesign, Design, DesignError, DesignRecord, Failure,
     ObserverSpec, RequestError, Run, Signal, Signals, check_controllable, synthesise_with,
@@ -68,69 +69,6 @@ impl Request {
     }
 }
 
-/// The fault estimator that is asked for.
-#[derive(Clone, Debug, PartialEq)]
-#[non_exhaustive]
-pub struct EstimatorSpec {
-    /// Method.
-    pub method: EstimatorMethod,
-    /// `j` in samples; chosen by [`commissioning::response_length`] when absent.
-    pub response_length: Option<usize>,
-    /// Where the predictor comes from.
-    pub database: DatabaseSource,
-    /// How large a residual must be to be called a fault.
-    pub threshold: Threshold,
-    /// Consecutive samples that raise or release a fault.
-    pub debounce: u32,
-    /// Repetitions of the very same reading after which a sensor is taken for frozen; 0: never.
-    pub stuck_after: u32,
-    /// Whether the response goes on being learned from healthy samples.
-    pub adapt: bool,
-    /// The periodic disturbance to be learned on line.
-    pub disturbance: Option<KnownDisturbance>,
-    /// What is asked of the state-based method.
-    pub hypotheses: HypothesesSpec,
-}
-
-impl Default for EstimatorSpec {
-    fn default() -> Self {
-        Self {
-            method: EstimatorMethod::Observer,
-            response_length: None,
-            database: DatabaseSource::Commission,
-            threshold: Threshold::Sigmas(6.0),
-            debounce: 1,
-            stuck_after: 0,
-            adapt: false,
-            disturbance: None,
-            hypotheses: HypothesesSpec::default(),
-        }
-    }
-}
-
-/// Where the healthy database comes from.
-#[derive(Clone, Debug, PartialEq)]
-#[non_exhaustive]
-pub enum DatabaseSource {
-    /// A commissioning run on the plant model.
-    Commission,
-    /// The model's own Markov parameters.
-    Model,
-    /// Logs of healthy operation: for each mode, the stretches in which it was active.
-    Recorded(Vec<Vec<Database>>),
-}
-
-/// How thresholds are chosen.
-#[derive(Clone, Debug, PartialEq)]
-#[non_exhaustive]
-pub enum Threshold {
-    /// One per sensor (p), in output units.
-    Given(Vec<f64>),
-    /// So many standard deviations of the healthy residual, and never below a thousandth of the
-    /// nominal value of the output.
-    Sigmas(f64),
-}
-
 /// The smallest threshold that is chosen automatically, relative to the nominal value.
 const SMALLEST_THRESHOLD: f64 = 1e-3;
 
@@ -174,6 +112,8 @@ pub fn assemble_with(request: Request, run: &Run) -> Result<Design, Failure> {
     work.check(&request.control)
         .map_err(|large| DesignError::Request(large.into()))?;
     check_operating_inputs(&request.plant, &request.signals.inputs).map_err(DesignError::from)?;
+    let asked = request.estimator.check(dims);
+    asked.map_err(DesignError::from)?;
     let estimator = estimator(&request, dims).map_err(DesignError::from)?;
     let scaling = request.signals.scaling();
     check_controllable(&request.plant, &request.control, &scaling)

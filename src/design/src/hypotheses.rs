@@ -2,10 +2,11 @@
 
 use crate::augmented;
 use crate::harmonics::KnownDisturbance;
+use crate::spec::{EstimatorNumber, SpecError, sizes_within, within};
 use crate::steady_state::steady_state;
 use crate::{Signal, Signals};
 use ftc_control::parameters::{Ambiguous, Hypotheses};
-use ftc_plant::{Mode, Scenario, SwitchedPlant};
+use ftc_plant::{Dimensions, Mode, Scenario, SwitchedPlant};
 use nalgebra::DVector;
 
 /// What may be asked of the state-based estimator; the rest follows from the design.
@@ -88,6 +89,29 @@ const DISTURBANCE: f64 = 0.05;
 const START: f64 = 3e-3;
 
 impl HypothesesSpec {
+    /// Whether every number lies in its range, for a plant of these sizes.
+    ///
+    /// # Errors
+    /// [`SpecError::Estimator`] or [`SpecError::EstimatorCount`].
+    pub fn check(&self, dims: Dimensions) -> Result<(), SpecError> {
+        use EstimatorNumber::{
+            Authority, FaultLength, FaultRate, InputLoad, ModeLength, ModelError,
+        };
+        within(ModelError, self.model_error, 0.0..=1.0)?;
+        within(FaultRate, self.fault_rate, 1e-12..=0.1)?;
+        within(FaultLength, self.fault_length, 2.0..=1e9)?;
+        if let Some(length) = self.mode_length {
+            within(ModeLength, length, 2.0..=1e9)?;
+        }
+        if let Some(sizes) = &self.authority {
+            sizes_within(Authority, sizes, dims.outputs)?;
+        }
+        if let Some(sizes) = &self.input_load {
+            sizes_within(InputLoad, sizes, dims.inputs)?;
+        }
+        Ok(())
+    }
+
     /// The estimator's sizes and rates for `plant` with these signals and this `noise` of the sensors (p), under
     /// the disturbance that is `known`. Where the references take an output further from
     /// its operating points than its nominal value, that distance stands in for it: `reach` (p), or empty.

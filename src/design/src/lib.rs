@@ -36,6 +36,7 @@ pub mod commissioning;
 mod controllability;
 pub mod coverage;
 pub mod derived;
+mod estimator_spec;
 mod feedforward;
 mod finished;
 mod grey_box;
@@ -80,7 +81,8 @@ pub use request::RequestError;
 pub use running_loop::{LostSensors, RunningLoop, SwitchingGain};
 pub use solver::{Run, Solver, Step};
 pub use spec::{
-    ControlSpec, DecayRate, Objective, ObserverChoice, ObserverSpec, SpecError, Weight,
+    ControlSpec, DecayRate, EstimatorNumber, Objective, ObserverChoice, ObserverSpec, SpecError,
+    Weight,
 };
 pub use state_feedback::{ModeGains, StateFeedback};
 pub use steady_state::steady_state;

@@ -7,6 +7,7 @@ use ftc_plant::Dimensions;
 use ftc_plant::scaling::Scaling;
 use serde::{Deserialize, Serialize};
 use std::fmt;
+use std::ops::RangeInclusive;
 
 /// The state feedback that is asked for.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -127,6 +128,71 @@ pub enum SpecError {
         /// The entry.
         value: f64,
     },
+    /// A number of the estimator is out of its range.
+    #[error("{of} is {value}: give a number from {least} to {most}")]
+    Estimator {
+        /// Which number.
+        of: EstimatorNumber,
+        /// Its value.
+        value: f64,
+        /// The least allowed.
+        least: f64,
+        /// The most allowed.
+        most: f64,
+    },
+    /// A list of the estimator's numbers has the wrong length.
+    #[error("{of} has {}: give {needed}", counted(*.found, "entry", "entries"))]
+    EstimatorCount {
+        /// Which numbers.
+        of: EstimatorNumber,
+        /// Entries found.
+        found: usize,
+        /// Entries needed.
+        needed: usize,
+    },
+}
+
+/// One of the numbers that the estimator is asked for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum EstimatorNumber {
+    /// Relative error of the plant's matrices.
+    ModelError,
+    /// Faults per sample and sensor.
+    FaultRate,
+    /// Mean length of a fault in samples.
+    FaultLength,
+    /// Mean length of a mode in samples.
+    ModeLength,
+    /// Largest correction of a sensor.
+    Authority,
+    /// Size of a load on an input.
+    InputLoad,
+    /// A threshold of a residual.
+    Threshold,
+    /// Thresholds in standard deviations of the residual.
+    Sigmas,
+    /// Consecutive samples that raise or release a fault.
+    Debounce,
+    /// Repetitions after which a sensor counts as frozen.
+    StuckAfter,
+}
+
+impl fmt::Display for EstimatorNumber {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::ModelError => "the model error",
+            Self::FaultRate => "the rate of faults",
+            Self::FaultLength => "the mean length of a fault",
+            Self::ModeLength => "the mean length of a mode",
+            Self::Authority => "the authority of the compensation",
+            Self::InputLoad => "the size of a load on an input",
+            Self::Threshold => "the threshold",
+            Self::Sigmas => "the threshold in standard deviations",
+            Self::Debounce => "the debounce",
+            Self::StuckAfter => "the count of repetitions of a frozen sensor",
+        })
+    }
 }
 
 /// One of the weights of (T2).
@@ -308,6 +374,40 @@ fn check_resonators(angles: &[f64]) -> Result<(), SpecError> {
         }
     }
     Ok(())
+}
+
+/// Whether a number of the estimator lies in its range.
+pub(crate) fn within(
+    of: EstimatorNumber,
+    value: f64,
+    range: RangeInclusive<f64>,
+) -> Result<(), SpecError> {
+    match range.contains(&value) {
+        true => Ok(()),
+        false => Err(SpecError::Estimator {
+            of,
+            value,
+            least: *range.start(),
+            most: *range.end(),
+        }),
+    }
+}
+
+/// Whether there are as many sizes as channels, each positive and of practical magnitude.
+pub(crate) fn sizes_within(
+    of: EstimatorNumber,
+    sizes: &[f64],
+    channels: usize,
+) -> Result<(), SpecError> {
+    if sizes.len() != channels {
+        return Err(SpecError::EstimatorCount {
+            of,
+            found: sizes.len(),
+            needed: channels,
+        });
+    }
+    let mut sizes = sizes.iter();
+    sizes.try_for_each(|&size| within(of, size, 1.0 / LARGEST..=LARGEST))
 }
 
 /// A decay rate lies in (0, 1]; strictly below 1 where a dwell time must come out of it.

@@ -158,17 +158,6 @@ pub fn fraction(value: f64) -> Result<(), ValueError> {
     }
 }
 
-/// A number between two bounds.
-///
-/// # Errors
-/// Any other.
-pub fn range(value: f64, least: f64, most: f64) -> Result<f64, ValueError> {
-    match (least..=most).contains(&value) {
-        true => Ok(value),
-        false => Err(ValueError::Range { value, least, most }),
-    }
-}
-
 /// A count between two bounds.
 ///
 /// # Errors

@@ -1,18 +1,18 @@
 //! The fault estimator that a design file asks for.
 
 use crate::check;
-use crate::complaint::{Complaint, Key, at};
+use crate::complaint::{Complaint, at};
 use crate::healthy_log::Logs;
 use crate::schema::{self, EstimatorMethod};
 use crate::values::{NameOrList, NumberOrList};
+use crate::wording::of_spec;
 use ftc_control::parameters;
-use ftc_design::assembly::{DatabaseSource, EstimatorSpec, KnownDisturbance, Threshold};
+use ftc_design::assembly::{
+    DatabaseSource, EstimatorSpec, KnownDisturbance, LONGEST_DEBOUNCE, Threshold,
+};
 use ftc_design::commissioning::longest_response;
 use ftc_design::{HypothesesSpec, MODE_LENGTH};
 use ftc_plant::Dimensions;
-
-/// The longest debounce in samples, and the most repetitions of a reading.
-const LONGEST_DEBOUNCE: usize = 10_000;
 
 /// How the names of logs end.
 const LOG_ENDINGS: [&str; 4] = [".csv", ".tsv", ".txt", ".dat"];
@@ -45,14 +45,14 @@ pub(crate) fn estimator(
         None => usual.debounce,
         Some(samples) => at(
             "estimator.debounce",
-            check::count(samples, 1, LONGEST_DEBOUNCE),
+            check::count(samples, 1, LONGEST_DEBOUNCE as usize),
         )? as u32,
     };
     let stuck_after = match given.stuck_after {
         None => usual.stuck_after,
         Some(samples) => at(
             "estimator.stuck_after",
-            check::count(samples, 0, LONGEST_DEBOUNCE),
+            check::count(samples, 0, LONGEST_DEBOUNCE as usize),
         )? as u32,
     };
     let hypotheses = hypotheses(given, dims)?;
@@ -78,6 +78,7 @@ pub(crate) fn estimator(
     estimator.adapt = given.adapt.unwrap_or(usual.adapt);
     estimator.disturbance = disturbance;
     estimator.hypotheses = hypotheses;
+    estimator.check(dims).map_err(|error| of_spec(&error))?;
     Ok(estimator)
 }
 
@@ -124,10 +125,6 @@ fn unread(given: &schema::Estimator, method: parameters::EstimatorMethod) -> Vec
 
 fn hypotheses(given: &schema::Estimator, dims: Dimensions) -> Result<HypothesesSpec, Complaint> {
     let usual = HypothesesSpec::default();
-    let within = |key: &str, value: Option<f64>, usual: f64, least: f64, most: f64| {
-        let value = check::range(value.unwrap_or(usual), least, most);
-        at(Key::from("estimator").then(key), value)
-    };
     let sizes = |key: &str, value: &Option<NumberOrList>, count: usize| match value {
         None => Ok(None),
         Some(value) => {
@@ -145,24 +142,12 @@ fn hypotheses(given: &schema::Estimator, dims: Dimensions) -> Result<HypothesesS
                 "is given, but the mode is told: add mode = \"estimated\", or remove it",
             ));
         }
-        (true, length) => Some(within("mode_length", length, MODE_LENGTH, 2.0, 1e9)?),
+        (true, length) => Some(length.unwrap_or(MODE_LENGTH)),
     };
     let mut hypotheses = HypothesesSpec::default();
-    hypotheses.model_error = within(
-        "model_error",
-        given.model_error,
-        usual.model_error,
-        0.0,
-        1.0,
-    )?;
-    hypotheses.fault_rate = within("fault_rate", given.fault_rate, usual.fault_rate, 1e-12, 0.1)?;
-    hypotheses.fault_length = within(
-        "fault_length",
-        given.fault_length,
-        usual.fault_length,
-        2.0,
-        1e9,
-    )?;
+    hypotheses.model_error = given.model_error.unwrap_or(usual.model_error);
+    hypotheses.fault_rate = given.fault_rate.unwrap_or(usual.fault_rate);
+    hypotheses.fault_length = given.fault_length.unwrap_or(usual.fault_length);
     hypotheses.ambiguous = match given.ambiguous {
         None => usual.ambiguous,
         Some(schema::Ambiguous::TrustSensors) => parameters::Ambiguous::TrustSensors,

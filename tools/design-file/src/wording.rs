@@ -10,8 +10,8 @@ use ftc_design::commissioning::{CommissioningError, LONGEST_RESPONSE};
 use ftc_design::spec::LARGEST;
 use ftc_design::work::{MOST_BYTES, TooLarge};
 use ftc_design::{
-    Advice, DecayRate, DesignError, Infeasibility, Lyapunov, RequestError, SolverFailure,
-    SpecError, Uncertified, Uncontrollable, Weight, words,
+    Advice, DecayRate, DesignError, EstimatorNumber, Infeasibility, Lyapunov, RequestError,
+    SolverFailure, SpecError, Uncertified, Uncontrollable, Weight, words,
 };
 use ftc_plant::PlantError;
 use ftc_plant::rectifier::RectifierError;
@@ -366,7 +366,36 @@ pub(crate) fn of_spec(error: &SpecError) -> Complaint {
             weight_key(*weight),
             format!("has the value {value}: give 0 or a positive number up to {LARGEST:e}"),
         ),
+        SpecError::Estimator {
+            of,
+            value,
+            least,
+            most,
+        } => Complaint::of(
+            estimator_key(*of),
+            ValueError::Range {
+                value: *value,
+                least: *least,
+                most: *most,
+            },
+        ),
         other => Complaint::general(other.to_string()),
+    }
+}
+
+fn estimator_key(of: EstimatorNumber) -> &'static str {
+    match of {
+        EstimatorNumber::ModelError => "estimator.model_error",
+        EstimatorNumber::FaultRate => "estimator.fault_rate",
+        EstimatorNumber::FaultLength => "estimator.fault_length",
+        EstimatorNumber::ModeLength => "estimator.mode_length",
+        EstimatorNumber::Authority => "estimator.authority",
+        EstimatorNumber::InputLoad => "estimator.input_load",
+        EstimatorNumber::Threshold => "estimator.threshold",
+        EstimatorNumber::Sigmas => "estimator.sigmas",
+        EstimatorNumber::Debounce => "estimator.debounce",
+        EstimatorNumber::StuckAfter => "estimator.stuck_after",
+        _ => "estimator",
     }
 }
 
