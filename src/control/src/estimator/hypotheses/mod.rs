@@ -367,10 +367,15 @@ impl Bank {
             let square = (seen.r[q] * seen.r[q] / variance).min(tuning.outlier);
             if (part * square).is_finite() {
                 let samples = &mut state.model_samples[mode];
-                *samples = (*samples + part * part).min(tuning.model_memory);
+                // In this order a damaged saved state is mended: what is no number becomes the bound.
+                *samples = (*samples + part * part)
+                    .max(tuning.model_prior)
+                    .min(tuning.model_memory);
                 let share = &mut state.model_share[mode];
                 *share += *share * part * (square - 1.0) / *samples;
-                *share = share.clamp(tuning.model_share_least, tuning.model_share_most);
+                *share = share
+                    .max(tuning.model_share_least)
+                    .min(tuning.model_share_most);
             }
         }
     }
