@@ -88,7 +88,11 @@ const STANDS: f64 = 1000.0;
 
 #[test]
 fn modes_of_random_plants_are_found() {
-    for (seed, count, faulty) in [(41, 24, false), (41, 24, true), (4242, 40, false)] {
+    for (seed, count, faulty, least) in [
+        (41, 24, false, 20),
+        (41, 24, true, 20),
+        (4242, 40, false, 36),
+    ] {
         let mut ratios = Vec::new();
         for mut design in designs(seed, count) {
             if faulty {
@@ -120,7 +124,7 @@ fn modes_of_random_plants_are_found() {
         let kept = ratios.len();
         let [median, most, worst] = [0.5, 0.9, 1.0].map(|share| quantile(&mut ratios, share));
         println!("faulty {faulty}, {kept} of {count}: {median:.4} {most:.4} {worst:.4}");
-        assert!(kept >= 20 && median <= 1.0 && worst <= 3.0);
+        assert!(kept >= least && median <= 1.0 && worst <= 3.0);
         assert!(faulty || most <= 1.05);
     }
 }

@@ -1,7 +1,7 @@
 //! Whether every part of a controller has the size that the others ask for, and finite numbers.
 
 use crate::error::ControllerError;
-use crate::estimator::hypotheses::MOST_MODES;
+use crate::estimator::hypotheses::{MOST_MODES, Sensors};
 use crate::matrix::Matrix;
 use crate::parameters::{
     ControllerParameters, Estimator, EstimatorMethod, Harmonics, Hypotheses, Limits,
@@ -348,6 +348,11 @@ fn hypotheses(settings: &Hypotheses, sizes: Sizes) -> Checked {
             .all(|value| (0.0..=LARGEST_SIZE).contains(value));
         range(sensible, field, "must hold numbers from 0 to 1e50")?;
     }
+    range(
+        p <= Sensors::BITS as usize,
+        "estimator.method",
+        "observes at most 64 outputs",
+    )?;
     fitted_modes(settings, sizes)?;
     range(
         settings.mode_rate.is_none() || sizes.modes <= MOST_MODES,

@@ -3,8 +3,9 @@
 use crate::commissioning::Database;
 use crate::harmonics::KnownDisturbance;
 use crate::hypotheses::HypothesesSpec;
-use crate::spec::{EstimatorNumber, LARGEST, SpecError, sizes_within, within};
+use crate::spec::{EstimatorNumber, LARGEST, SMALLEST, SpecError, sizes_within, within};
 use ftc_control::parameters::EstimatorMethod;
+use ftc_control::tuning::DatabaseTuning;
 use ftc_plant::Dimensions;
 
 /// The fault estimator that is asked for.
@@ -13,7 +14,7 @@ use ftc_plant::Dimensions;
 pub struct EstimatorSpec {
     /// Method.
     pub method: EstimatorMethod,
-    /// `j` in samples; chosen by [`commissioning::response_length`] when absent.
+    /// `j` in samples; chosen by [`crate::commissioning::response_length`] when absent.
     pub response_length: Option<usize>,
     /// Where the predictor comes from.
     pub database: DatabaseSource,
@@ -37,7 +38,7 @@ impl Default for EstimatorSpec {
             method: EstimatorMethod::Observer,
             response_length: None,
             database: DatabaseSource::Commission,
-            threshold: Threshold::Sigmas(6.0),
+            threshold: Threshold::Sigmas(DatabaseTuning::default().threshold_deviations),
             debounce: 1,
             stuck_after: 0,
             adapt: false,
@@ -73,7 +74,7 @@ impl EstimatorSpec {
                 sizes_within(EstimatorNumber::Threshold, sizes, dims.outputs)?;
             }
             Threshold::Sigmas(sigmas) => {
-                within(EstimatorNumber::Sigmas, *sigmas, 1.0 / LARGEST..=LARGEST)?;
+                within(EstimatorNumber::Sigmas, *sigmas, SMALLEST..=LARGEST)?;
             }
         }
         self.hypotheses.check(dims)

@@ -40,6 +40,9 @@ pub struct ControlSpec {
 /// quantity in reasonable units is larger, and beyond it products overflow.
 pub const LARGEST: f64 = 1e15;
 
+/// The smallest magnitude of a number that is to be positive: beyond it quotients overflow.
+pub const SMALLEST: f64 = 1.0 / LARGEST;
+
 /// The longest latency in samples.
 pub const LONGEST_LATENCY: usize = 1;
 
@@ -407,7 +410,7 @@ pub(crate) fn sizes_within(
         });
     }
     let mut sizes = sizes.iter();
-    sizes.try_for_each(|&size| within(of, size, 1.0 / LARGEST..=LARGEST))
+    sizes.try_for_each(|&size| within(of, size, SMALLEST..=LARGEST))
 }
 
 /// A decay rate lies in (0, 1]; strictly below 1 where a dwell time must come out of it.

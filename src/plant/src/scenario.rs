@@ -329,6 +329,18 @@ mod tests {
         let kinds = [0.0, 1.0, 6.0, 7.0, -1.0, f64::NAN].map(InjectedKind::of);
         let (first, last) = (Some(InjectedKind::Bias), Some(InjectedKind::Noise));
         assert_eq!(kinds, [None, first, last, None, None, None]);
+        // A new kind must be listed: this match does not compile without it.
+        for (at, (kind, _)) in InjectedKind::ALL.iter().enumerate() {
+            let place = match kind {
+                InjectedKind::Bias => 0,
+                InjectedKind::Drift => 1,
+                InjectedKind::Gain => 2,
+                InjectedKind::Stuck => 3,
+                InjectedKind::Dropout => 4,
+                InjectedKind::Noise => 5,
+            };
+            assert_eq!(at, place);
+        }
     }
 
     #[test]

@@ -49,6 +49,9 @@ use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 /// Runs that are worked on together; what is kept in memory is bounded by it.
 const BATCH: u64 = 256;
 
+/// The most faults that a run may be asked to have.
+pub const MOST_FAULTS: u32 = 16;
+
 /// What is drawn in each run.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
@@ -108,7 +111,7 @@ impl OptionsError {
                 "is {value}, but it changes matrices and the plant of this design is nonlinear: leave it out"
             ),
             Self::LargestFault(value) => format!("is {value}: give 1 to 1e6 thresholds"),
-            Self::MostFaults(value) => format!("is {value}: give at most 16"),
+            Self::MostFaults(value) => format!("is {value}: give at most {MOST_FAULTS}"),
         }
     }
 }
@@ -153,7 +156,7 @@ impl Options {
         if !(1.0..=1e6).contains(&self.largest_fault) {
             return Err(OptionsError::LargestFault(self.largest_fault));
         }
-        if self.most_faults > 16 {
+        if self.most_faults > MOST_FAULTS {
             return Err(OptionsError::MostFaults(self.most_faults));
         }
         Ok(())

@@ -1,11 +1,8 @@
 //! What a value must satisfy, whatever key it stands under.
 
 use crate::sentence::shorten;
-use ftc_design::spec::LARGEST;
+use ftc_design::spec::{LARGEST, SMALLEST};
 use ftc_design::words::counted;
-
-/// No positive one is smaller; beyond it quotients overflow.
-const SMALLEST: f64 = 1.0 / LARGEST;
 
 /// Longest name of a design, in bytes.
 const LONGEST_NAME: usize = 64;
