@@ -6,7 +6,7 @@
 use crate::augmented::scaled;
 use crate::derived;
 use crate::harmonics::{self, KnownDisturbance};
-use crate::hypotheses;
+use crate::hypotheses::{self, FAULT_RATES, MODEL_ERRORS};
 use crate::observer::{check_decoupling, lost_gains_fit};
 use crate::spec::LARGEST;
 use crate::{
@@ -328,8 +328,8 @@ fn hypotheses_fit(design: &Design) -> bool {
     }
     let positive = |&noise: &f64| noise > 0.0 && noise <= LARGEST;
     let chosen = found.noise.iter().all(positive)
-        && (0.0..=1.0).contains(&found.model_error)
-        && (1e-12..=0.1).contains(&found.fault_rate)
+        && MODEL_ERRORS.contains(&found.model_error)
+        && FAULT_RATES.contains(&found.fault_rate)
         && (1e-9..=0.5).contains(&found.release_rate)
         && found
             .mode_rate

@@ -8,6 +8,7 @@ use crate::{Signal, Signals};
 use ftc_control::parameters::{Ambiguous, Hypotheses};
 use ftc_plant::{Dimensions, Mode, Scenario, SwitchedPlant};
 use nalgebra::DVector;
+use std::ops::RangeInclusive;
 
 /// What may be asked of the state-based estimator; the rest follows from the design.
 #[derive(Clone, Debug, PartialEq)]
@@ -29,6 +30,10 @@ pub struct HypothesesSpec {
     pub input_load: Option<Vec<f64>>,
 }
 
+/// Relative errors of a model that may be asked for.
+pub(crate) const MODEL_ERRORS: RangeInclusive<f64> = 0.0..=1.0;
+/// Faults per sample and sensor that may be asked for.
+pub(crate) const FAULT_RATES: RangeInclusive<f64> = 1e-12..=0.1;
 /// Mean length of a mode in samples, where none is given.
 pub const MODE_LENGTH: f64 = 500.0;
 
@@ -97,8 +102,8 @@ impl HypothesesSpec {
         use EstimatorNumber::{
             Authority, FaultLength, FaultRate, InputLoad, ModeLength, ModelError,
         };
-        within(ModelError, self.model_error, 0.0..=1.0)?;
-        within(FaultRate, self.fault_rate, 1e-12..=0.1)?;
+        within(ModelError, self.model_error, MODEL_ERRORS)?;
+        within(FaultRate, self.fault_rate, FAULT_RATES)?;
         within(FaultLength, self.fault_length, 2.0..=1e9)?;
         if let Some(length) = self.mode_length {
             within(ModeLength, length, 2.0..=1e9)?;

@@ -193,7 +193,7 @@ pub fn first_tick(time: f64, sample_time: f64) -> u64 {
 }
 
 impl Waveform {
-    /// Silence.
+    /// Zero at every sample.
     pub const ZERO: Self = Self::Constant { value: 0.0 };
 
     /// Its least and its largest value in the first `steps` ticks, of which a million are looked at; infinite

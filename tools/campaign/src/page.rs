@@ -474,7 +474,7 @@ pub fn read(text: &str) -> Result<(Partial, u64), ReadError> {
     let known = whole.is_object();
     let whole: Partial = serde_json::from_value(whole).map_err(|error| match known {
         true => ReadError::Other(error),
-        false => ReadError::No(error),
+        false => ReadError::NoCampaign,
     })?;
     let asked = value.get("asked").and_then(Value::as_u64);
     let asked = asked.unwrap_or(whole.statistics.runs);
@@ -488,6 +488,9 @@ pub enum ReadError {
     /// Something else.
     #[error("is no result of a campaign ({0}): name a campaign.json")]
     No(#[from] serde_json::Error),
+    /// Something else, in JSON.
+    #[error("is no result of a campaign: name a campaign.json")]
+    NoCampaign,
     /// Its fields are not today's.
     #[error("was written by another version, or changed since ({0}): run the campaign again")]
     Other(#[source] serde_json::Error),

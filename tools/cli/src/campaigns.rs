@@ -39,7 +39,8 @@ pub struct Arguments {
     #[arg(long, value_name = "I/N", value_parser = parse_shard)]
     shard: Option<(u64, u64)>,
     /// Put these campaign.json of other shards together instead of doing runs.
-    #[arg(long, value_name = "FILE", num_args = 1.., conflicts_with_all = ["shard", "rows", "replay", "resume"])]
+    #[arg(long, value_name = "FILE", num_args = 1..,
+          conflicts_with_all = ["shard", "rows", "replay", "resume", "seed", "jobs", "model_error", "largest_fault", "most_faults"])]
     merge: Vec<PathBuf>,
     /// Go on with the runs that are missing from the campaign.json in DIR.
     #[arg(long, conflicts_with = "rows")]

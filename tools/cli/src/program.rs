@@ -27,6 +27,7 @@ use ftc_design::as_printed::{theorem_1, theorem_2};
 use ftc_design::assembly::Request;
 use ftc_design::{Design, MOST_THREADS, Run, Solver, Step};
 use output::Staging;
+use package::signature::SigningKey;
 use package::solved::{self, LoadError};
 use progress::Progress;
 use report::simulate::{Extent, SimulateError, simulate_into};
@@ -336,6 +337,9 @@ fn run(
             sign,
         } => {
             check_output(out)?;
+            if let Some(key) = sign {
+                SigningKey::check(key)?;
+            }
             let made = solve(design, &asked(solved.as_deref(), None), &progress)?;
             export(&made, out, *ssp, binaries, sign.as_deref())
         }
@@ -546,6 +550,12 @@ struct How<'a> {
 
 /// Reads a design file and makes the design, or takes it from where it was kept.
 fn solve(path: &Path, how: &How, progress: &Progress) -> Result<Made, Failure> {
+    let unsaved = |file: &Path, error: solved::SaveError| {
+        Failure::Input(format!("--save {}: {error}", file.display()))
+    };
+    if let Some(file) = how.save {
+        solved::check_place(file).map_err(|error| unsaved(file, error))?;
+    }
     let (request, source) = Source::split(read(path, progress)?);
     announce(path, &request, how, progress)?;
     let asked = request.control.clone();
@@ -568,8 +578,7 @@ fn solve(path: &Path, how: &How, progress: &Progress) -> Result<Made, Failure> {
         }
     };
     if let Some(file) = how.save {
-        solved::save(file, key, &design)
-            .map_err(|error| Failure::Input(format!("--save {}: {error}", file.display())))?;
+        solved::save(file, key, &design).map_err(|error| unsaved(file, error))?;
     }
     Ok(source.made(design))
 }

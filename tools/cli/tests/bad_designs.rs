@@ -1138,7 +1138,17 @@ fn a_command_line_without_sense() {
 #[test]
 fn a_command_line_that_does_not_fit_is_refused_in_one_line() {
     let bench = Bench::new(SOUND);
-    let cases: [(&[&str], &str); 7] = [
+    let cases: [(&[&str], &str); 9] = [
+        (
+            &[
+                "campaign", FILE, "--out", "x", "--merge", "a", "--seed", "7",
+            ],
+            "'--merge <FILE>...' cannot be used with '--seed <SEED>'",
+        ),
+        (
+            &["campaign", FILE, "--out", "x", "--most-faults", "99"],
+            "a whole number from 0 to 16",
+        ),
         (&["design"], "were not provided: <DESIGN>; see --help"),
         (
             &["desing", FILE],

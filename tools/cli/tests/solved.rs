@@ -4,7 +4,7 @@
 
 mod common;
 
-use common::{Bench, FILE, SOUND};
+use common::{Bench, FILE, SOUND, damaged};
 use std::fs;
 
 #[test]
@@ -18,6 +18,26 @@ fn a_kept_design_gives_the_same_run() {
     assert_eq!(anew.code(), 0, "{}", anew.stderr());
     let table = |folder: &str| fs::read(bench.path(folder).join("trajectories.csv")).unwrap();
     assert_eq!(table("kept"), table("anew"));
+}
+
+#[test]
+fn a_place_or_a_key_that_cannot_serve_is_refused_before_anything_is_solved() {
+    // Were it solved first, the sentence would be that of a design with no solution.
+    let infeasible = damaged("decay = 0.7\noutput", "decay = 0.001\noutput");
+    let bench = Bench::new(infeasible.replace("latency = 0", "latency = 1"));
+    let run = bench.run(&["design", FILE, "--save", "none/solved.json"]);
+    assert_eq!(run.code(), 2, "{}", run.stderr());
+    let words = "--save none/solved.json: cannot be written to (No such file or directory";
+    assert!(run.stderr().contains(words), "{}", run.stderr());
+    assert!(!run.stderr().contains(".ftc-fmu"), "{}", run.stderr());
+    let run = bench.run(&["export", FILE, "--out", "out", "--sign", FILE]);
+    assert_eq!(run.code(), 2, "{}", run.stderr());
+    assert!(
+        run.stderr().contains("is no such key: name"),
+        "{}",
+        run.stderr()
+    );
+    assert_eq!(bench.files(), [FILE]);
 }
 
 #[test]

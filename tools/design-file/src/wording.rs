@@ -304,7 +304,7 @@ pub(crate) fn of_spec(error: &SpecError) -> Complaint {
     match error {
         SpecError::NothingTracked => Complaint::of(
             "controller.tracked",
-            "is empty: name at least one output, or count it from 1",
+            "is empty: name at least one output, by its name or its number from 1",
         ),
         SpecError::TooFewInputs { tracked, inputs } => Complaint::of(
             "controller.tracked",

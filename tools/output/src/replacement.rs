@@ -30,6 +30,8 @@ impl Replacement {
         // A result may be read by whoever may read other files of this user.
         #[cfg(unix)]
         builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o666));
+        // What is said of a folder that is missing names no temporary file.
+        std::fs::metadata(folder)?;
         let begin = || {
             let _turn = unfinished::turn(folder);
             // What cannot be removed does no harm.

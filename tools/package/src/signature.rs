@@ -62,6 +62,19 @@ impl fmt::Display for Origin {
 }
 
 impl SigningKey {
+    /// Whether a file holds a secret key, without its password.
+    ///
+    /// # Errors
+    /// [`Error::Key`] in one sentence.
+    pub fn check(path: &Path) -> Result<(), Error> {
+        let key = parsed(&text(path, SIGN)?);
+        key.map(drop).ok_or_else(|| Error::Key {
+            option: SIGN,
+            file: path.into(),
+            what: NO_KEY.into(),
+        })
+    }
+
     /// Reads a secret key; its password, if it has one, is that in the environment variable
     /// [`PASSWORD`], or is asked for on the terminal.
     ///
@@ -74,7 +87,7 @@ impl SigningKey {
             what,
         };
         let text = text(path, SIGN)?;
-        let held = SecretKeyBox::from_string(&text).map_err(|error| refused(no_key(&error)))?;
+        let held = SecretKeyBox::from_string(&text).map_err(|_| refused(NO_KEY.into()))?;
         let found = match (unprotected(&text), std::env::var(PASSWORD)) {
             (Some(key), _) => Ok(key),
             (None, Ok(password)) => held.into_secret_key(Some(password)),
@@ -86,7 +99,7 @@ impl SigningKey {
                 "cannot be used ({error}): name a secret key that minisign -G has made, and if it has a password, set {PASSWORD}"
             ))
         })?;
-        let public = PublicKey::from_secret_key(&key).map_err(|error| refused(no_key(&error)))?;
+        let public = PublicKey::from_secret_key(&key).map_err(|_| refused(NO_KEY.into()))?;
         Ok(Self { key, public })
     }
 
@@ -135,10 +148,10 @@ impl VerifyingKey {
     /// [`Error::Key`] in one sentence.
     pub fn read(path: &Path) -> Result<Self, Error> {
         let found = PublicKeyBox::from_string(&text(path, KEY)?).and_then(PublicKey::from_box);
-        let key = found.map_err(|error| Error::Key {
+        let key = found.map_err(|_| Error::Key {
             option: KEY,
             file: path.into(),
-            what: no_key(&error),
+            what: NO_KEY.into(),
         })?;
         Ok(Self {
             key,
@@ -158,17 +171,20 @@ fn text(path: &Path, option: &'static str) -> Result<String, Error> {
     String::from_utf8(bytes).map_err(|_| refused("is no text: name a key file of minisign".into()))
 }
 
-fn no_key(error: &minisign::PError) -> String {
-    format!("is no such key ({error}): name a key file of minisign")
-}
+/// What is said of a file that holds something else.
+const NO_KEY: &str = "is no such key: name a key file of minisign";
 
 /// A secret key without a password. Those of the minisign program have no checksum, which its box asks
 /// for; a damaged one cannot verify what it signs, which is tried.
 fn unprotected(text: &str) -> Option<SecretKey> {
+    parsed(text).filter(|key| !key.is_encrypted())
+}
+
+/// A secret key as it stands in a file, its numbers still hidden if it has a password.
+fn parsed(text: &str) -> Option<SecretKey> {
     let line = text.lines().nth(1)?;
     let bytes = Base64::decode_to_vec(line.trim(), None).ok()?;
-    let key = SecretKey::from_bytes(&bytes).ok()?;
-    Some(key).filter(|key| !key.is_encrypted())
+    SecretKey::from_bytes(&bytes).ok()
 }
 
 /// A key's number as minisign writes it.

@@ -104,6 +104,14 @@ pub fn save(path: &Path, key: String, design: &Design) -> Result<(), SaveError> 
     Ok(replacement.keep()?)
 }
 
+/// Whether a design can be kept at this path.
+///
+/// # Errors
+/// [`SaveError::Write`]
+pub fn check_place(path: &Path) -> Result<(), SaveError> {
+    Ok(Replacement::of(path).map(drop)?)
+}
+
 /// Reads a solved design that belongs to this key, and proves it again.
 ///
 /// # Errors
