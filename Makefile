@@ -93,7 +93,7 @@ browser: build
 		$(BROWSER)/controller/documentation/index.html $(BROWSER)/plant/documentation/index.html
 
 # The demonstration needs FMPy alone, which takes less to install than all that the tests need; and, where no
-# program is built yet, one without the formats of others that it does not read, which takes a fifth less to
+# program is built yet, one without the formats of others that it does not read, which takes a sixth less to
 # compile. What a later `make build` needs of it is not compiled twice (by cargo 1.91 or later).
 DEMO := target/demo
 ifneq ($(wildcard target/release/ftc-fmu),)

@@ -5,7 +5,7 @@ use crate::progress::{Progress, Runs};
 use crate::rows::{self, Rows};
 use crate::{check_output, failure::Failure};
 use campaign::files::{self, PAGE, RESULT};
-use campaign::{MOST_FAULTS, Options, OptionsError, Partial, Watch};
+use campaign::{Options, OptionsError, Partial, Watch};
 use clap::Args;
 use ftc_design::{Design, MOST_THREADS};
 use report::Made;
@@ -61,7 +61,7 @@ pub struct Arguments {
     largest_fault: f64,
     /// The most faults in one run.
     #[arg(long, default_value_t = Options::default().most_faults, allow_negative_numbers = true,
-          value_parser = whole::<u32>(0, MOST_FAULTS.into()))]
+          value_parser = whole::<u32>(0, u32::MAX.into()))]
     most_faults: u32,
 }
 

@@ -1134,7 +1134,6 @@ fn a_command_line_without_sense() {
     }
 }
 
-/// A number of the command line is told with its option and what to give.
 #[test]
 fn a_command_line_that_does_not_fit_is_refused_in_one_line() {
     let bench = Bench::new(SOUND);
@@ -1146,8 +1145,8 @@ fn a_command_line_that_does_not_fit_is_refused_in_one_line() {
             "'--merge <FILE>...' cannot be used with '--seed <SEED>'",
         ),
         (
-            &["campaign", FILE, "--out", "x", "--most-faults", "99"],
-            "a whole number from 0 to 16",
+            &["campaign", FILE, "--out", "x", "--most-faults", "-1"],
+            "'-1' for '--most-faults <MOST_FAULTS>': give a whole number from 0",
         ),
         (&["design"], "were not provided: <DESIGN>; see --help"),
         (
@@ -1185,6 +1184,7 @@ fn a_command_line_that_does_not_fit_is_refused_in_one_line() {
     assert_eq!(bench.files(), [FILE]);
 }
 
+/// A number of the command line is told with its option and what to give.
 #[test]
 fn numbers_of_the_command_line() {
     let bench = Bench::new(SOUND);

@@ -341,7 +341,11 @@ fn a_campaign_combines_its_model_error_with_the_true_plant() {
 #[test]
 fn an_option_out_of_range_is_named() {
     let bench = Bench::new(SOUND);
-    for (option, value) in [("--model-error", "7"), ("--largest-fault", "0.5")] {
+    for (option, value) in [
+        ("--model-error", "7"),
+        ("--largest-fault", "0.5"),
+        ("--most-faults", "99"),
+    ] {
         let run = bench.run(&["campaign", FILE, "--out", "out", option, value]);
         assert_eq!(run.code(), 2);
         let said = run.stderr();
