@@ -92,8 +92,8 @@ browser: build
 		$(BROWSER)/campaign/campaign.html $(BROWSER)/tank/report.html $(BROWSER)/reproduce/paper.html $(BROWSER)/reproduce/converter.html \
 		$(BROWSER)/controller/documentation/index.html $(BROWSER)/plant/documentation/index.html
 
-# The demonstration needs FMPy alone, which takes less to install than all that the tests need; and, where no
-# program is built yet, one without the formats of others that it does not read, which takes a sixth less to
+# The demonstration needs FMPy alone, and of what FMPy depends on only what a loop of FMUs takes, which is less to
+# install than all that the tests need; and, where no program is built yet, one without the formats of others that it does not read, which takes a sixth less to
 # compile. What a later `make build` needs of it is not compiled twice (by cargo 1.91 or later).
 DEMO := target/demo
 ifneq ($(wildcard target/release/ftc-fmu),)
@@ -115,7 +115,7 @@ $(DEMO)/program:
 $(DEMO)/python/ready: tests/requirements.txt
 	rm -rf $(DEMO)/python
 	$(PYTHON) -m venv $(DEMO)/python
-	$(DEMO)/python/bin/pip install --quiet --disable-pip-version-check --no-compile --constraint tests/requirements.txt FMPy numpy
+	$(DEMO)/python/bin/pip install --quiet --disable-pip-version-check --no-compile --no-deps --constraint tests/requirements.txt FMPy attrs lxml numpy
 	touch $@
 
 bench: build $(VENV)/ready
