@@ -163,7 +163,7 @@ lint: $(VENV)/ready
 	$(PYTHON) tests/named.py
 
 # Each library crate as it would be published, built from its archive alone.
-LIBRARIES := ftc-linalg ftc-plant ftc-control ftc-record ftc-lapack ftc-design ftc-simulate ftc-baselines ftc-identify
+LIBRARIES := ftc-plant ftc-control ftc-record ftc-lapack ftc-design ftc-simulate ftc-baselines ftc-identify
 
 # Cargo takes a version it has unpacked once for unchanged for ever, also from the registry that
 # it makes of these archives: what it unpacked of an earlier state goes first.

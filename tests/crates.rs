@@ -14,28 +14,21 @@ fn root() -> &'static Path {
 }
 
 /// What each library crate and each FMU may need of this project; dependencies of tests do not count.
-const ARROWS: [(&str, &[&str]); 13] = [
+const ARROWS: [(&str, &[&str]); 12] = [
     ("ftc-control", &[]),
-    ("ftc-linalg", &[]),
-    ("ftc-lapack", &["ftc-linalg"]),
-    ("ftc-plant", &["ftc-linalg"]),
+    ("ftc-lapack", &[]),
+    ("ftc-plant", &[]),
     ("ftc-record", &["ftc-control", "ftc-plant"]),
     (
         "ftc-design",
-        &[
-            "ftc-control",
-            "ftc-lapack",
-            "ftc-linalg",
-            "ftc-plant",
-            "ftc-record",
-        ],
+        &["ftc-control", "ftc-lapack", "ftc-plant", "ftc-record"],
     ),
     ("ftc-simulate", &["ftc-control", "ftc-plant", "ftc-record"]),
     (
         "ftc-baselines",
         &["ftc-control", "ftc-design", "ftc-plant", "ftc-simulate"],
     ),
-    ("ftc-identify", &["ftc-linalg"]),
+    ("ftc-identify", &[]),
     // What runs in an FMU: neither synthesis nor certificates.
     ("model-description", &["ftc-plant", "ftc-record"]),
     ("fmu-abi", &["model-description"]),

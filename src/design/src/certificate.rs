@@ -116,7 +116,7 @@ pub(crate) struct Coordinates {
 
 impl Coordinates {
     pub(crate) fn new(lyapunov: &FactoredLyapunov) -> Option<Self> {
-        let outward = Enclosure::exact(ftc_linalg::inverse(lyapunov.basis.clone())?);
+        let outward = Enclosure::exact(lyapunov.basis.clone().try_inverse()?);
         let basis = Enclosure::exact(lyapunov.basis.clone());
         let core = Enclosure::exact(lyapunov.core.clone());
         if lyapunov.core != lyapunov.core.transpose() {
@@ -203,7 +203,7 @@ pub(crate) fn largest_ratio(above: &DMatrix<f64>, below: &DMatrix<f64>) -> Optio
     let half = factor.solve_lower_triangular(above)?;
     let ratio = factor.solve_lower_triangular(&half.transpose())?;
     let symmetric = 0.5 * (&ratio + ratio.transpose());
-    Some(ftc_linalg::symmetric_eigenvalues(&symmetric).max())
+    Some(symmetric.symmetric_eigenvalues().max())
 }
 
 /// The first condition that fails, as an error.

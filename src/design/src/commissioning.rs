@@ -274,7 +274,7 @@ pub fn predictor_of_stretches(
         let (stretch, k) = windows[row];
         stretch.outputs[(k + response_length, output)]
     });
-    let qr = ftc_linalg::qr(stacked);
+    let qr = stacked.qr();
     let mut rotated = targets.clone().resize_vertically(samples + unknowns, 0.0);
     qr.q_tr_mul(&mut rotated);
     let factor = qr.r();
@@ -334,7 +334,7 @@ pub fn weakest_direction(predictor: &Predictor, units: &[f64]) -> (f64, usize, u
     for (column, mut entries) in factor.column_iter_mut().enumerate() {
         entries /= units[column % inputs];
     }
-    let svd = ftc_linalg::right_svd(factor);
+    let svd = factor.svd(false, true);
     let values = &svd.singular_values;
     let ratio = values.min() / values.max().max(f64::MIN_POSITIVE);
     let heaviest = svd

@@ -109,6 +109,6 @@ fn is_movable(model: &AugmentedMode, eigenvalue: Complex<f64>) -> bool {
     pencil
         .columns_mut(states, model.b.ncols())
         .copy_from(&complex(&model.b));
-    let values = ftc_linalg::complex_singular_values(&pencil);
+    let values = pencil.singular_values();
     values.min() > RANK_TOLERANCE * values.max()
 }

@@ -15,7 +15,7 @@
 use super::StateFeedback;
 use super::augmented::{AugmentedMode, augment};
 use super::state_feedback::scaled_gain;
-use ftc_linalg::pseudo_inverse;
+use crate::pseudo_inverse::pseudo_inverse;
 use ftc_plant::SwitchedPlant;
 use nalgebra::DMatrix;
 
@@ -85,7 +85,7 @@ mod tests {
             decay in 0.01..0.9999f64,
         ) {
             let raw = DMatrix::from_vec(4, 4, entries);
-            let a = &raw * (decay / ftc_linalg::singular_values(&raw).max());
+            let a = &raw * (decay / raw.singular_values().max());
             let h = DMatrix::from_vec(2, 4, weights);
             let cost = cost_to_go(&a, &h);
             let error = (h.transpose() * &h + a.transpose() * &cost * &a - &cost).amax();

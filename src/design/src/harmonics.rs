@@ -105,8 +105,10 @@ fn map(from: &DMatrix<Complex<f64>>, to: &DMatrix<Complex<f64>>, units: &[f64]) 
         entered /= unit;
     }
     let threshold = TOLERANCE * from.norm().max(f64::MIN_POSITIVE);
-    let inverse = ftc_linalg::complex_pseudo_inverse(from.clone(), threshold)
-        .unwrap_or_else(|| from.adjoint());
+    let inverse = from
+        .clone()
+        .pseudo_inverse(threshold)
+        .unwrap_or_else(|_| from.adjoint());
     let product = to * inverse;
     let part = |of: fn(&Complex<f64>) -> f64| {
         plain(&DMatrix::from_fn(

@@ -1,7 +1,6 @@
 //! The Moore-Penrose inverse.
 
 use crate::augmented::scaled;
-use ftc_linalg::pseudo_inverse;
 use nalgebra::DMatrix;
 
 /// [`pseudo_inverse`] of a matrix whose rows and columns have units (powers of two): taken where every
@@ -19,4 +18,17 @@ pub(crate) fn pseudo_inverse_in(
         }
     }
     inverse
+}
+
+/// The Moore-Penrose inverse; singular values below `tolerance` times the largest count as zero.
+pub(crate) fn pseudo_inverse(matrix: &DMatrix<f64>, tolerance: f64) -> DMatrix<f64> {
+    let zero = DMatrix::zeros(matrix.ncols(), matrix.nrows());
+    // The decomposition panics on what is not a number.
+    let regular = matrix.iter().all(|value| value.abs() < 1e150);
+    if matrix.is_empty() || matrix.amax() == 0.0 || !regular {
+        return zero;
+    }
+    let svd = matrix.clone().svd(true, true);
+    let threshold = tolerance * svd.singular_values.max();
+    svd.pseudo_inverse(threshold).unwrap_or(zero)
 }

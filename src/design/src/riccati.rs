@@ -101,7 +101,7 @@ mod tests {
             radius in 0.1..0.999f64,
         ) {
             let (raw, b) = (matrix(&a), matrix(&b));
-            let stable = &raw * (radius / ftc_linalg::singular_values(&raw).max());
+            let stable = &raw * (radius / raw.singular_values().max());
             let h = DMatrix::identity(3, 3);
             let cost = lyapunov(&stable, &h).unwrap();
             let error = (stable.transpose() * &cost * &stable + &h - &cost).amax();

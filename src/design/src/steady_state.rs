@@ -1,6 +1,6 @@
 //! Where a mode comes to rest.
 
-use ftc_linalg::pseudo_inverse;
+use crate::pseudo_inverse::pseudo_inverse;
 use ftc_plant::Mode;
 use nalgebra::DMatrix;
 

@@ -55,7 +55,9 @@ fn steady(model: &Model) -> (DVector<f64>, DVector<f64>, DVector<f64>) {
     let (n, m) = (model.a.nrows(), model.b.ncols());
     let constant = model.a0.column(0).into_owned();
     let drift = DMatrix::identity(n, n) - &model.a;
-    let (x0, u0) = match ftc_linalg::inverse(drift.clone())
+    let (x0, u0) = match drift
+        .clone()
+        .try_inverse()
         .filter(|inverse| inverse.norm() < WORST_CONDITION)
     {
         Some(inverse) => (inverse * &constant, DVector::zeros(m)),
@@ -64,7 +66,7 @@ fn steady(model: &Model) -> (DVector<f64>, DVector<f64>, DVector<f64>) {
             let mut both = DMatrix::zeros(n, n + m);
             both.columns_mut(0, n).copy_from(&drift);
             both.columns_mut(n, m).copy_from(&-&model.b);
-            let svd = ftc_linalg::svd(both);
+            let svd = both.svd(true, true);
             let tolerance = svd.singular_values.max() * 1e-8;
             let found = svd
                 .solve(&constant, tolerance)
@@ -92,7 +94,7 @@ fn by_switches(data: &Data, models: &[Model]) -> Option<(Vec<Change>, f64)> {
         let base = changes[known].as_ref()?;
         let transform = &map * &base.transform;
         // own = map (base.transform (x - base.origin)) + offset
-        let origin = &base.origin - ftc_linalg::inverse(transform.clone())? * offset;
+        let origin = &base.origin - transform.clone().try_inverse()? * offset;
         changes[new] = Some(Change { transform, origin });
     }
     let all: Option<Vec<Change>> = changes.into_iter().collect();
@@ -165,7 +167,7 @@ fn between(
 }
 
 fn condition(matrix: &DMatrix<f64>) -> f64 {
-    let values = ftc_linalg::singular_values(matrix);
+    let values = matrix.singular_values();
     values.max() / values.min()
 }
 
@@ -174,14 +176,20 @@ fn condition(matrix: &DMatrix<f64>) -> f64 {
 fn by_changes(data: &Data, models: &[Model], changes: &[Change]) -> Vec<Placed> {
     let first = readable(&data.output_scale, &models[0]);
     let start = steady(&models[0]);
-    let inverse = ftc_linalg::inverse(first.clone()).unwrap_or_else(|| first.transpose());
+    let inverse = first
+        .clone()
+        .try_inverse()
+        .unwrap_or_else(|| first.transpose());
     // Where the first mode's operating point is put: at its outputs, in physical units.
     let place = physical_outputs(data, 0, &start.2, first.nrows());
     let mut placed = Vec::new();
     for (model, change) in models.iter().zip(changes) {
         let (own, u0, y0) = steady(model);
         // shared raw state (first mode's own) of this operating point
-        let back = ftc_linalg::inverse(change.transform.clone())
+        let back = change
+            .transform
+            .clone()
+            .try_inverse()
             .unwrap_or_else(|| change.transform.transpose());
         let raw = &back * own + &change.origin;
         let moved = model.transformed(&(&first * &back), &(&change.transform * &inverse));
@@ -209,7 +217,7 @@ fn readable(scale: &DVector<f64>, model: &Model) -> DMatrix<f64> {
     if p > n || condition(&model.c) > WORST_CONDITION {
         return DMatrix::identity(n, n);
     }
-    let normal = ftc_linalg::symmetric_eigen(c.transpose() * &c);
+    let normal = (c.transpose() * &c).symmetric_eigen();
     let mut order: Vec<usize> = (0..n).collect();
     order.sort_by(|&one, &other| normal.eigenvalues[one].total_cmp(&normal.eigenvalues[other]));
     let mut all = DMatrix::zeros(n, n);
@@ -280,7 +288,7 @@ fn by_outputs(data: &Data, models: &[Model], places: Vec<(usize, usize)>) -> Vec
         let inverse = if unusable {
             None
         } else {
-            ftc_linalg::inverse(transform.clone())
+            transform.clone().try_inverse()
         };
         placed.push(match inverse {
             Some(inverse) => Placed {

@@ -68,7 +68,7 @@ pub fn initial_state(model: &Model, stretch: &Stretch, samples: usize) -> Option
     if !(observed.iter().chain(rest.iter())).all(|value| value.is_finite()) {
         return None;
     }
-    let svd = ftc_linalg::try_svd(observed)?;
+    let svd = observed.try_svd(true, true, f64::EPSILON, 0)?;
     let tolerance = svd.singular_values.max() * 1e-10;
     svd.solve(&rest, tolerance).ok()
 }

@@ -9,14 +9,14 @@ const RELATIVE_RANK: f64 = 1e-10;
 /// `Z` lacks rank. `None` where the decomposition fails.
 pub fn fit(targets: &DMatrix<f64>, regressors: &DMatrix<f64>) -> Option<DMatrix<f64>> {
     // Z' = Q R: what remains is square.
-    let qr = ftc_linalg::qr(regressors.transpose());
+    let qr = regressors.transpose().qr();
     let projected = targets * qr.q();
     solve(&qr.r(), &projected)
 }
 
 /// `X` of least `|X R' - P|`.
 fn solve(r: &DMatrix<f64>, projected: &DMatrix<f64>) -> Option<DMatrix<f64>> {
-    let svd = ftc_linalg::try_svd(r.clone())?;
+    let svd = r.clone().try_svd(true, true, f64::EPSILON, 0)?;
     let tolerance = svd.singular_values.max() * RELATIVE_RANK;
     let solution = svd.solve(&projected.transpose(), tolerance).ok()?;
     solution

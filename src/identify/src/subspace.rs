@@ -120,7 +120,7 @@ fn states(
         }
     }
     let predicted = map * lagged;
-    let eigen = ftc_linalg::symmetric_eigen(&predicted * predicted.transpose());
+    let eigen = (&predicted * predicted.transpose()).symmetric_eigen();
     let mut largest: Vec<usize> = (0..eigen.eigenvalues.len()).collect();
     largest.sort_by(|&one, &other| eigen.eigenvalues[other].total_cmp(&eigen.eigenvalues[one]));
     let chosen = largest.get(..order)?;

@@ -3,7 +3,7 @@
 use crate::jacobi;
 use crate::view::{Triangle, letter, matrix, matrix_mut, size};
 use libc::{c_char, c_int};
-use nalgebra::DMatrix;
+use nalgebra::{DMatrix, SymmetricEigen};
 
 /// What a routine reports through `info`: 0, or the code to hand over.
 type Info = Result<(), c_int>;
@@ -244,7 +244,7 @@ fn eigen(a: DMatrix<f64>, vectors: bool) -> Result<(Vec<f64>, Option<DMatrix<f64
         return Err(1);
     }
     let iterations = 100 * a.nrows().max(10);
-    let found = ftc_linalg::try_symmetric_eigen(a, f64::EPSILON, iterations).ok_or(1)?;
+    let found = SymmetricEigen::try_new(a, f64::EPSILON, iterations).ok_or(1)?;
     let mut order: Vec<usize> = (0..found.eigenvalues.len()).collect();
     order.sort_by(|&i, &j| found.eigenvalues[i].total_cmp(&found.eigenvalues[j]));
     let values = order.iter().map(|&i| found.eigenvalues[i]).collect();

@@ -30,6 +30,7 @@
 mod continuous;
 pub mod deviation;
 mod dimensions;
+mod eigenvalues;
 mod error;
 pub mod noise;
 pub mod rectifier;
@@ -40,8 +41,8 @@ mod true_plant;
 
 pub use deviation::Deviation;
 pub use dimensions::Dimensions;
+pub use eigenvalues::{eigenvalues, spectral_radius};
 pub use error::PlantError;
-pub use ftc_linalg::{eigenvalues, spectral_radius};
 pub use scenario::Scenario;
 pub use true_plant::TruePlant;
 

@@ -170,7 +170,7 @@ fn balance(
     }
     // The normal matrix is a graph's Laplacian, held at the given values: its eigenvalues are zero or
     // not small.
-    let eigen = ftc_linalg::symmetric_eigen(normal);
+    let eigen = normal.symmetric_eigen();
     let threshold = 1e-10 * unknowns as f64;
     let coordinates = eigen.eigenvectors.tr_mul(&right);
     let filtered = coordinates.zip_map(&eigen.eigenvalues, |coordinate, value| {

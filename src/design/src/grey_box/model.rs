@@ -155,7 +155,7 @@ impl GreyBox<'_> {
             return lost;
         }
         // Directions that the window cannot tell apart are left at none.
-        let svd = ftc_linalg::svd(free);
+        let svd = free.svd(true, true);
         let least = 1e-9 * svd.singular_values.max();
         let kept = svd.singular_values.iter().filter(|&&value| value > least);
         let kept = kept.count();

@@ -26,7 +26,7 @@ impl ScalingPoint {
         let lower = lower.lower();
         let between = transposed_times(&dual, &lower);
         let gram = symmetric(transposed_times(&between, &between));
-        let eigen = ftc_linalg::symmetric_eigen(gram);
+        let eigen = gram.symmetric_eigen();
         let smallest = f64::EPSILON.powi(2) * eigen.eigenvalues.max();
         if smallest.is_nan() || smallest <= 0.0 {
             return None;
@@ -60,7 +60,7 @@ impl ScalingPoint {
         let relative = DMatrix::from_fn(scaled.nrows(), scaled.ncols(), |r, c| {
             scaled[(r, c)] / (roots[r] * roots[c])
         });
-        let least = ftc_linalg::symmetric_eigenvalues(&relative).min();
+        let least = relative.symmetric_eigenvalues().min();
         if least >= 0.0 {
             1.0
         } else {

@@ -27,7 +27,7 @@ pub(crate) fn check_detectable(a: &DMatrix<f64>, c: &DMatrix<f64>, decay: f64) -
         if !pencil.iter().all(|value| value.norm() < 1e150) {
             return Err(f64::INFINITY);
         }
-        let values = ftc_linalg::complex_singular_values(&pencil);
+        let values = pencil.singular_values();
         if values.min() <= 1e-9 * values.max() {
             return Err(lambda.norm());
         }

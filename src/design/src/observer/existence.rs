@@ -95,7 +95,7 @@ fn rank(matrix: &DMatrix<f64>) -> usize {
     if matrix.is_empty() {
         return 0;
     }
-    let values = ftc_linalg::singular_values(matrix);
+    let values = matrix.clone().singular_values();
     let largest = values.max();
     values
         .iter()

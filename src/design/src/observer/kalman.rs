@@ -96,7 +96,7 @@ impl Filtered {
         let mut gain = DMatrix::zeros(self.a.nrows(), self.c.nrows());
         let across = inverse * c.transpose();
         let seen = riccati::symmetric(&c * &across);
-        let found = across * ftc_linalg::pseudo_inverse(&seen, 1e-12);
+        let found = across * crate::pseudo_inverse::pseudo_inverse(&seen, 1e-12);
         for (k, &column) in kept.iter().enumerate() {
             gain.set_column(column, &found.column(k));
         }

@@ -75,14 +75,16 @@ fn unmeasured(c: &DMatrix<f64>) -> DMatrix<f64> {
     }
     // Eigenvectors of C'C: an SVD of a wide matrix would leave the null space out.
     let rows = c.row_iter().map(|row| row.norm()).fold(0.0, f64::max);
-    let eigen = ftc_linalg::symmetric_eigen(c.tr_mul(c) / (rows * rows));
+    let eigen = (c.tr_mul(c) / (rows * rows)).symmetric_eigen();
     let hidden: Vec<usize> = (0..n).filter(|&k| eigen.eigenvalues[k] < 1e-14).collect();
     eigen.eigenvectors.select_columns(&hidden)
 }
 
 /// The norm of a matrix in that of `P = root root'`.
 fn size_in(root: &DMatrix<f64>, inverse: &DMatrix<f64>, matrix: &DMatrix<f64>) -> f64 {
-    ftc_linalg::singular_values(&(root.transpose() * matrix * inverse.transpose())).max()
+    (root.transpose() * matrix * inverse.transpose())
+        .singular_values()
+        .max()
 }
 
 /// The gain nearest the Kalman filter's on the way to the projection in `P` whose error shrinks by
@@ -97,7 +99,7 @@ pub(super) fn blended(
     // A margin for rounding errors in the proof.
     let decay = decay * (1.0 - 1e-7);
     let root = function.clone().cholesky()?.unpack();
-    let inverse = ftc_linalg::inverse(root.clone())?;
+    let inverse = root.clone().try_inverse()?;
     let projection = filter.projection(lost, &(inverse.transpose() * &inverse));
     let mixed = |share: f64| (1.0 - share) * kalman + share * &projection;
     let shrinks = |share: f64| size_in(&root, &inverse, &filter.error(&mixed(share))) < decay;

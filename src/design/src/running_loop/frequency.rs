@@ -103,7 +103,7 @@ impl Response {
             (false, _) => f64::INFINITY,
             (true, false) => bound,
             (true, true) if response.nrows().min(response.ncols()) > 1 => {
-                ftc_linalg::complex_singular_values(&response).max()
+                response.singular_values().max()
             }
             (true, true) => bound,
         }
@@ -231,7 +231,7 @@ mod tests {
         let turn = Complex::from_polar(1.0, angle);
         let inner = DMatrix::from_diagonal_element(a.nrows(), a.nrows(), turn) - a;
         let response = c * inner.lu().solve(&b).unwrap() + d;
-        ftc_linalg::complex_singular_values(&response).max()
+        response.singular_values().max()
     }
 
     proptest! {

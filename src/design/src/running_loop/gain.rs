@@ -133,7 +133,7 @@ impl Channel<'_> {
             &(riccati::symmetric(cost) + DMatrix::identity(n, n) * (strictness * strictness)),
         )?;
         let root = storage.cholesky()?.unpack();
-        Some(&normalised.basis * ftc_linalg::inverse(root.transpose())? / level)
+        Some(&normalised.basis * root.transpose().try_inverse()? / level)
     }
 
     /// Coordinates in which the disturbance reaches every direction alike.
@@ -230,7 +230,7 @@ impl Channel<'_> {
         let cost = riccati::symmetric(c.tr_mul(&c)) + DMatrix::identity(n, n) * room;
         let root = riccati::lyapunov(&a, &cost)?.cholesky()?.unpack();
         Some(FactoredLyapunov {
-            basis: basis * ftc_linalg::inverse(root.transpose())?,
+            basis: basis * root.transpose().try_inverse()?,
             core: DMatrix::identity(n, n),
         })
     }

@@ -97,13 +97,13 @@ impl Normalisation {
         let level = norms.fold(0.0, f64::max).max(1e-9) * 1.05;
         let mut mean: Option<DMatrix<f64>> = None;
         for channel in &channels {
-            let inverse = ftc_linalg::inverse(channel.storage(level, 1e-3)?)?;
+            let inverse = channel.storage(level, 1e-3)?.try_inverse()?;
             let function = inverse.tr_mul(&inverse) / channels.len() as f64;
             mean = Some(mean.map_or(function.clone(), |sum| sum + function));
         }
         let inverse = riccati::symmetric(mean?).cholesky()?.unpack().transpose();
         Some(Self {
-            basis: ftc_linalg::inverse(inverse.clone())?,
+            basis: inverse.clone().try_inverse()?,
             inverse,
             level,
         })
@@ -114,7 +114,7 @@ impl Normalisation {
         let root = function.clone().cholesky()?.unpack();
         let size = root.nrows();
         Some(FactoredLyapunov {
-            basis: &self.basis * ftc_linalg::inverse(root.transpose())?,
+            basis: &self.basis * root.transpose().try_inverse()?,
             core: DMatrix::identity(size, size),
         })
     }

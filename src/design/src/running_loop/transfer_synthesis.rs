@@ -61,7 +61,7 @@ fn proved(
 fn factored(basis: &DMatrix<f64>, core: &DMatrix<f64>) -> Option<FactoredLyapunov> {
     let root = core.clone().cholesky()?.unpack();
     Some(FactoredLyapunov {
-        basis: basis * ftc_linalg::inverse(root.transpose())?,
+        basis: basis * root.transpose().try_inverse()?,
         core: DMatrix::identity(root.nrows(), root.nrows()),
     })
 }
@@ -101,7 +101,7 @@ fn for_all(subject: &Subject, steps: &[Step], decay: f64) -> Option<TransferCert
         mean += riccati::lyapunov(&(step.plain.midpoint() / decay), &identity)?;
     }
     let inverse = riccati::symmetric(mean).cholesky()?.unpack().transpose();
-    let basis = ftc_linalg::inverse(inverse.clone())?;
+    let basis = inverse.clone().try_inverse()?;
     let seen = |map: &DMatrix<f64>| &inverse * map * &basis;
     let plain: Vec<_> = steps.iter().map(|s| seen(s.plain.midpoint())).collect();
     let reset: Vec<_> = steps.iter().map(|s| seen(s.reset.midpoint())).collect();

@@ -163,7 +163,7 @@ impl<'a> Data<'a> {
     fn finish(&self, level: f64, bound: f64, solved: Solved, mode: usize) -> Option<Game> {
         // S = X^-1 = L^-T L^-1.
         let lower = solved.value.cholesky()?.unpack();
-        let basis = ftc_linalg::inverse(lower.transpose())?;
+        let basis = lower.transpose().try_inverse()?;
         let size = basis.nrows();
         Some(Game {
             level,

@@ -19,10 +19,10 @@ use crate::interior_point::{
     Block, Bound, Congruence, Point, Problem, Product, Settings, Solution, maximise,
 };
 use crate::lmi::Margin;
+use crate::pseudo_inverse::pseudo_inverse;
 use crate::solver::{Run, Step};
 use crate::verdict::SolverFailure;
 use crate::{ControlSpec, Lyapunov};
-use ftc_linalg::pseudo_inverse;
 use nalgebra::DMatrix;
 
 /// How far, as a factor, Lyapunov matrices may be from the identity on average.

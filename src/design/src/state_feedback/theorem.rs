@@ -5,9 +5,9 @@ use crate::augmented::AugmentedMode;
 use crate::blocks::{BlockKind, BlockName};
 use crate::certificate::FactoredLyapunov;
 use crate::lmi::{Affine, Inequality, Margin, Problem, Variable, trace};
+use crate::pseudo_inverse::pseudo_inverse;
 use crate::verdict::SolverFailure;
 use crate::{ControlSpec, Lyapunov};
-use ftc_linalg::pseudo_inverse;
 use nalgebra::DMatrix;
 
 /// The unknowns of one mode: `S`, `G + G' - S` as an expression, `G` and `R = K~ G`.

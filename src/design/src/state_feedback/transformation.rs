@@ -52,7 +52,7 @@ impl Transformation {
         let sum = cores.fold(0.0 * &first.core, |sum, core| sum + core);
         let root = (sum / parts.len() as f64).cholesky()?.unpack();
         let basis = &first.basis * root;
-        let inverse = ftc_linalg::inverse(basis.clone())?;
+        let inverse = basis.clone().try_inverse()?;
         let finite = inverse.iter().all(|value| value.is_finite());
         let inputs = models[0].b.ncols();
         finite.then_some(Self {
@@ -74,7 +74,7 @@ impl Transformation {
         let effect = effect.fold(DMatrix::zeros(inputs, inputs), |sum, effect| sum + effect);
         let root = effect
             .cholesky()
-            .and_then(|factor| ftc_linalg::inverse(factor.l().transpose()));
+            .and_then(|factor| factor.l().transpose().try_inverse());
         if let Some(root) = root.filter(|root| root.iter().all(|value| value.is_finite())) {
             self.input = root;
         }
@@ -197,7 +197,7 @@ fn regulator_cost(a: &DMatrix<f64>, b: &DMatrix<f64>) -> Option<DMatrix<f64>> {
     let identity = DMatrix::<f64>::identity(a.nrows(), a.nrows());
     let (mut transition, mut reach, mut cost) = (a.clone(), b * b.transpose(), identity.clone());
     for _ in 0..DOUBLINGS {
-        let shared = ftc_linalg::inverse(&identity + &reach * &cost)?;
+        let shared = (&identity + &reach * &cost).try_inverse()?;
         let carried = &transition * shared;
         let growth = transition.transpose()
             * &cost
