@@ -93,9 +93,9 @@ browser: build
 		$(BROWSER)/controller/documentation/index.html $(BROWSER)/plant/documentation/index.html
 
 # The demonstration needs FMPy alone, and of its dependencies what a loop of FMUs imports. Where no program is built
-# yet, it compiles one without the formats of others, which it does not read, and with ftc-design for size, which
-# takes a third less to compile: its design of the example then takes a hundredth of a second more. A later `make build`
-# compiles that crate and the tools once more, and nothing else twice (by cargo 1.91 or later).
+# yet, it compiles one without the formats of others, which it does not read, and with less optimisation of what it
+# hardly runs (tools/demo.toml): its design of the example takes a hundredth of a second more. A later `make build`
+# compiles these crates and the tools once more, and nothing else twice (by cargo 1.91 or later).
 DEMO := target/demo
 ifneq ($(wildcard target/release/ftc-fmu),)
 DEMO_PROGRAM := target/release
@@ -110,8 +110,7 @@ demo: $(DEMO)/python/ready
 
 .PHONY: $(DEMO)/program
 $(DEMO)/program:
-	CARGO_BUILD_BUILD_DIR=target cargo build --release --target-dir $(DEMO) --package ftc-fmu $(FMUS) --no-default-features \
-		--config 'profile.release.package.ftc-design.opt-level = "s"'
+	CARGO_BUILD_BUILD_DIR=target cargo build --release --target-dir $(DEMO) --package ftc-fmu $(FMUS) --no-default-features --config tools/demo.toml
 	tools/platforms/native.sh $(DEMO_PROGRAM)
 
 $(DEMO)/python/ready: tests/requirements.txt
