@@ -5,6 +5,7 @@ use crate::text::significant;
 use ftc_control::Controller;
 use ftc_design::Design;
 use ftc_plant::deviation::{Load, Port};
+use ftc_plant::scenario::NEVER;
 use ftc_plant::{Deviation, Dimensions, TruePlant};
 use ftc_simulate::closed_loop::visit;
 use ftc_simulate::{PlantSimulator, Variant};
@@ -81,7 +82,7 @@ fn departures(design: &Design) -> Vec<(String, Deviation)> {
         deviation.loads.push(Load {
             at,
             from: middle,
-            until: f64::MAX,
+            until: NEVER,
             size,
         });
         all.push((name, deviation));
