@@ -16,7 +16,7 @@ pub use synthesis::{synthesise, synthesise_with};
 pub(crate) use proof::scaled_gain;
 
 use super::certificate::ControlCertificate;
-use super::{ControlSpec, DwellTime};
+use super::{ControlSpec, DwellTime, Units};
 use crate::pseudo_inverse::pseudo_inverse_in;
 use ftc_control::parameters::{self, FeedbackGains};
 use ftc_plant::SwitchedPlant;
@@ -69,6 +69,11 @@ pub struct StateFeedback {
 /// near one), counts as complete rejection: nothing smaller is sought.
 pub const REJECTION: f64 = 1e-4;
 
+/// [`REJECTION`] in physical units.
+pub(crate) fn rejection(units: &Units) -> f64 {
+    REJECTION * units.performance / units.disturbance
+}
+
 /// How far above its optimum, relatively, a `gamma` may lie and be called the optimum.
 const OPTIMALITY: f64 = 1e-3;
 
@@ -77,8 +82,7 @@ impl StateFeedback {
     /// is rejected completely ([`REJECTION`]); `None` where no `gamma` was asked for.
     pub fn is_optimal(&self, mode: usize) -> Option<bool> {
         let (gamma, optimum) = (self.gamma.as_ref()?[mode], self.optimum.as_ref()?[mode]);
-        let units = &self.certificate.units;
-        let rejection = REJECTION * units.performance / units.disturbance;
+        let rejection = rejection(&self.certificate.units);
         Some(gamma <= (1.0 + OPTIMALITY) * optimum.max(rejection))
     }
 

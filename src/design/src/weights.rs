@@ -4,10 +4,10 @@
 //! part of `v` is small at every frequency can be changed without changing `gamma`, and so shapes
 //! the gains hardly; where only one part is large, its weight scales `gamma` and shapes nothing either.
 
-use crate::Weight;
 use crate::augmented::augment;
 use crate::running_loop::frequency::Response;
-use crate::state_feedback::{StateFeedback, scaled_gain};
+use crate::state_feedback::{StateFeedback, rejection, scaled_gain};
+use crate::{Design, Objective, Weight};
 use ftc_plant::SwitchedPlant;
 use nalgebra::DMatrix;
 
@@ -77,5 +77,157 @@ impl WeightShares {
     pub fn largest_idle(&self) -> f64 {
         let idle = self.0.iter().filter(|(weight, _)| self.is_idle(*weight));
         idle.map(|(_, share)| *share).fold(0.0, f64::max)
+    }
+}
+
+/// Weights that were asked for and do not shape the state feedback, or hardly.
+#[derive(Clone, Debug, PartialEq)]
+#[non_exhaustive]
+pub struct WithoutEffect {
+    /// Which, at least one.
+    pub weights: Vec<Weight>,
+    /// Why not.
+    pub reason: Reason,
+}
+
+/// Why a weight has no effect, or hardly any.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
+pub enum Reason {
+    /// The objective is the decay alone.
+    DecayOnly,
+    /// No disturbance reaches the state.
+    NoDisturbance,
+    /// The disturbance can be rejected completely, whatever the weights are.
+    Rejected,
+    /// One weight decides `gamma` alone, and only the weights' ratios shape the gains.
+    Alone {
+        /// That weight.
+        weight: Weight,
+        /// How many times smaller it would have to be, or the others larger.
+        times: f64,
+    },
+    /// Little of the performance signal comes from there.
+    Small {
+        /// Share of the performance signal, 0 to 1.
+        share: f64,
+        /// How many times larger a weight would act.
+        times: f64,
+    },
+}
+
+/// Which of the weights that were asked for have no effect on the state feedback, or hardly any.
+pub fn without_effect(design: &Design, asked: &[Weight]) -> Option<WithoutEffect> {
+    let control = design.synthesis()?.state_feedback;
+    let reason = match (&control.gamma, control.spec.objective) {
+        (_, Objective::Decay) => Reason::DecayOnly,
+        (None, Objective::Attenuation) => Reason::NoDisturbance,
+        (Some(gamma), Objective::Attenuation) => {
+            let rejection = rejection(&control.certificate.units);
+            if gamma.iter().any(|&gamma| gamma > rejection) {
+                return WeightShares::of(&design.plant, &control)?.without_effect(asked);
+            }
+            Reason::Rejected
+        }
+    };
+    let weights = asked.to_vec();
+    (!weights.is_empty()).then_some(WithoutEffect { weights, reason })
+}
+
+/// What makes the command of a design smaller.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum SmallerCommand {
+    /// A slower decay.
+    SlowerDecay,
+    /// The objective [`Objective::Decay`]: the weight of the inputs decides `gamma` alone, so that a larger one
+    /// hardly changes the gains.
+    DecayObjective,
+    /// A larger weight of the inputs, or a slower decay.
+    LargerInputWeight,
+}
+
+impl SmallerCommand {
+    /// Of a design.
+    pub fn of(design: &Design) -> Self {
+        let Some(synthesis) = design.synthesis() else {
+            return Self::LargerInputWeight;
+        };
+        let control = &synthesis.state_feedback;
+        if control.spec.objective == Objective::Decay {
+            return Self::SlowerDecay;
+        }
+        let shares = WeightShares::of(&design.plant, control);
+        match shares.and_then(|shares| shares.alone()) {
+            Some(Weight::Input) => Self::DecayObjective,
+            _ => Self::LargerInputWeight,
+        }
+    }
+}
+
+impl WeightShares {
+    /// Which of these weights have hardly any effect; where one weight decides `gamma` alone, none has.
+    fn without_effect(&self, asked: &[Weight]) -> Option<WithoutEffect> {
+        let alone = self.alone();
+        let weak = |weight: &Weight| alone.is_some() || self.is_idle(*weight);
+        let weights: Vec<Weight> = asked.iter().copied().filter(weak).collect();
+        let times = |share: f64| (0.5 / share.max(1e-12)).ceil();
+        let reason = match alone {
+            Some(weight) => Reason::Alone {
+                weight,
+                times: times(self.largest_idle()),
+            },
+            None => {
+                let shares = weights.iter().map(|&weight| self.share(weight));
+                let share = shares.fold(0.0, f64::max);
+                Reason::Small {
+                    share,
+                    times: times(share),
+                }
+            }
+        };
+        (!weights.is_empty()).then_some(WithoutEffect { weights, reason })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{Reason, WeightShares, WithoutEffect};
+    use crate::Weight::{Input, Integral, Output};
+
+    fn shares(output: f64, integral: f64, input: f64) -> WeightShares {
+        WeightShares([(Output, output), (Integral, integral), (Input, input)])
+    }
+
+    #[test]
+    fn a_weight_with_a_small_share_hardly_acts() {
+        let found = shares(0.9, 0.4, 0.05);
+        assert_eq!(found.without_effect(&[Output, Integral]), None);
+        assert_eq!(
+            found.without_effect(&[Output, Input]),
+            Some(WithoutEffect {
+                weights: vec![Input],
+                reason: Reason::Small {
+                    share: 0.05,
+                    times: 10.0
+                },
+            })
+        );
+    }
+
+    #[test]
+    fn beside_a_weight_that_decides_alone_none_acts() {
+        let found = shares(0.02, 0.01, 1.0);
+        assert_eq!(
+            found.without_effect(&[Output, Input]),
+            Some(WithoutEffect {
+                weights: vec![Output, Input],
+                reason: Reason::Alone {
+                    weight: Input,
+                    times: 25.0
+                },
+            })
+        );
+        assert_eq!(found.without_effect(&[]), None);
     }
 }

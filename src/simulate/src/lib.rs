@@ -25,6 +25,7 @@ pub mod detection;
 pub mod integrate;
 pub mod metrics;
 pub mod plant;
+pub mod robustness;
 pub mod warnings;
 
 pub use closed_loop::{Trajectory, Variant, run, run_with};

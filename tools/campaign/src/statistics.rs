@@ -2,7 +2,7 @@
 
 use crate::histogram::Histogram;
 use crate::run::Outcome;
-use report::robustness::WORSE;
+use ftc_simulate::robustness::WORSE;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 

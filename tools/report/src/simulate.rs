@@ -63,7 +63,7 @@ impl Extent {
         let kept = if baselines { 5 } else { 3 };
         Self {
             steps,
-            runs: kept + 2 * robustness::count(size) as u64,
+            runs: kept + 2 * ftc_simulate::robustness::count(size) as u64,
             bytes: steps * NUMBER * (shared as u64 + kept * own as u64),
         }
     }
@@ -184,9 +184,9 @@ pub fn simulate(
     } = gather(design, baselines, samples)?;
     warnings.extend(warnings::of_runs(design, &watches));
     let metrics = metrics(&digests, bound.as_deref(), &warnings);
-    let cases = robustness::cases(design);
+    let cases = ftc_simulate::robustness::cases(design, &controller(design));
     let worse = robustness::warnings(design, &cases);
-    let tried = format!("{:#}\n", robustness::json(&cases, &worse));
+    let tried = format!("{:#}\n", robustness::json(design, &cases, &worse));
     warnings.extend(worse);
     let mut files = vec![
         ("metrics.json".to_string(), metrics.into_bytes()),

@@ -4,10 +4,9 @@ use crate::text::{count, number};
 use design_file::schema::{DesignFile, ObserverKind};
 use design_file::sentence::shorten;
 use design_file::wording::weight_key;
-use ftc_design::state_feedback::REJECTION;
 use ftc_design::warnings::{Doubt, Guess, LoggedMovement, Warning};
-use ftc_design::weights::WeightShares;
-use ftc_design::{Design, Objective, Weight};
+use ftc_design::weights::{self, Reason, SmallerCommand};
+use ftc_design::{Design, Weight};
 use ftc_plant::deviation::Destabilised;
 use ftc_simulate::warnings::{RunWarning, RunWatch};
 use std::fmt::Write;
@@ -39,75 +38,46 @@ fn given_weights(file: &DesignFile) -> Vec<Weight> {
     given.map(|(weight, _)| *weight).collect()
 }
 
-/// Weights that were given and shape nothing.
+/// Weights that were given and shape nothing, or hardly anything.
 fn idle_weights(file: &DesignFile, design: &Design) -> Option<String> {
-    let given = given_weights(file);
-    let names: Vec<&str> = given.iter().map(|weight| weight_key(*weight)).collect();
-    let control = &design.proof.as_ref()?.state_feedback;
-    let reason = match (&control.gamma, control.objective) {
-        (_, Objective::Decay) => {
-            "objective = \"decay\" looks at nothing but the decay: ask for \"attenuation\""
-        }
-        (None, Objective::Attenuation) => {
-            "no disturbance reaches the state: give E, F or a B that is not zero"
-        }
-        (Some(gamma), Objective::Attenuation) => {
-            let units = &control.certificate.units;
-            let rejection = REJECTION * units.performance / units.disturbance;
-            let rejected = gamma.iter().all(|&gamma| gamma <= rejection);
-            if !rejected {
-                return weak_weights(&given, design);
-            }
-            "the disturbance can be rejected completely, whatever they are"
-        }
-    };
-    let have = if names.len() == 1 { "has" } else { "have" };
-    (!names.is_empty()).then(|| format!("{} {have} no effect: {reason}", names.join(", ")))
-}
-
-/// What each weight contributes to the performance signal.
-fn shares(design: &Design) -> Option<WeightShares> {
-    let control = design.synthesis()?.state_feedback;
-    (control.spec.objective == Objective::Attenuation).then_some(())?;
-    WeightShares::of(&design.plant, &control)
-}
-
-/// Weights that were given and shape the gains hardly, with what lets them act.
-fn weak_weights(given: &[Weight], design: &Design) -> Option<String> {
-    let shares = shares(design)?;
-    let alone = shares.alone();
-    let weak: Vec<Weight> = given
-        .iter()
-        .copied()
-        .filter(|&weight| alone.is_some() || shares.is_idle(weight))
-        .collect();
-    if weak.is_empty() {
-        return None;
-    }
-    let names: Vec<&str> = weak.iter().map(|weight| weight_key(*weight)).collect();
-    let have = if weak.len() == 1 { "has" } else { "have" };
-    let times = |share: f64| number((0.5 / share.max(1e-12)).ceil());
-    let reason = match alone {
-        Some(weight) => format!(
-            "{} alone decides gamma, and only the weights' ratios shape the gains: make it {} times \
-             smaller, or the others larger",
-            weight_key(weight),
-            times(shares.largest_idle())
+    let found = weights::without_effect(design, &given_weights(file))?;
+    let (none, hardly) = ("no effect", "hardly any effect on the state feedback");
+    let (effect, reason) = match found.reason {
+        Reason::DecayOnly => (
+            none,
+            "objective = \"decay\" looks at nothing but the decay: ask for \"attenuation\"".into(),
         ),
-        None => {
-            let largest = weak.iter().map(|&weight| shares.share(weight));
-            let largest = largest.fold(0.0, f64::max);
+        Reason::NoDisturbance => (
+            none,
+            "no disturbance reaches the state: give E, F or a B that is not zero".into(),
+        ),
+        Reason::Rejected => (
+            none,
+            "the disturbance can be rejected completely, whatever they are".into(),
+        ),
+        Reason::Alone { weight, times } => (
+            hardly,
+            format!(
+                "{} alone decides gamma, and only the weights' ratios shape the gains: make it {} times smaller, or \
+                 the others larger",
+                weight_key(weight),
+                number(times)
+            ),
+        ),
+        Reason::Small { share, times } => (
+            hardly,
             format!(
                 "at most {:.1} % of the performance signal comes from there: a weight {} times larger would act",
-                100.0 * largest,
-                times(largest)
-            )
-        }
+                100.0 * share,
+                number(times)
+            ),
+        ),
+        other => (hardly, format!("{other:?}")),
     };
-    Some(format!(
-        "{} {have} hardly any effect on the state feedback: {reason}",
-        names.join(", ")
-    ))
+    let names = found.weights.iter().map(|weight| weight_key(*weight));
+    let names: Vec<&str> = names.collect();
+    let have = if names.len() == 1 { "has" } else { "have" };
+    Some(format!("{} {have} {effect}: {reason}", names.join(", ")))
 }
 
 const UNKNOWN_NOISE: &str = "neither scenario.noise nor estimator.threshold is given: a residual of a thousandth of an \
@@ -235,11 +205,9 @@ fn of_doubt(doubt: &Doubt) -> String {
 
 /// What makes the command smaller.
 fn calmer(design: &Design) -> &'static str {
-    let alone = shares(design).and_then(|shares| shares.alone());
-    let control = design.proof.as_ref().map(|proof| &proof.state_feedback);
-    match (control.map(|control| control.objective), alone) {
-        (Some(Objective::Decay), _) => "ask for a slower decay",
-        (_, Some(Weight::Input)) => {
+    match SmallerCommand::of(design) {
+        SmallerCommand::SlowerDecay => "ask for a slower decay",
+        SmallerCommand::DecayObjective => {
             "try controller.objective = decay (input_weight alone decides gamma: a larger one hardly changes the state feedback)"
         }
         _ => "raise controller.input_weight, ask for a slower decay",
