@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # Tries the wheel of dist/ in a fresh virtual environment in which no Rust can be found: its own tests,
-# README's example, every example of examples/python, and the tests of tests/ on the program it brings.
+# README's example, every example of examples/python, and most tests of tests/ on the program it brings.
 set -euo pipefail
 cd "$(dirname "$0")/../.."
 
@@ -31,4 +31,6 @@ for example in quadruple_tank dc_motor boost_converter; do
     python "examples/python/$example.py" --out "$folder/$example" --runs 100
 done
 python examples/python/from_a_log.py --out "$folder/from_a_log"
-FTC_FMU=$PWD/$environment/bin/ftc-fmu python -m pytest --numprocesses auto --dist worksteal tests
+# Proofs and optima, checked at length on another build of the same sources, are left out.
+FTC_FMU=$PWD/$environment/bin/ftc-fmu python -m pytest --numprocesses auto --dist worksteal tests \
+    --ignore tests/cvxpy --ignore tests/reference/test_exact_proof.py --ignore tests/reference/test_running_loop.py
