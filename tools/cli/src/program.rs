@@ -459,7 +459,8 @@ fn export(
     };
     let exported = package::export(&made.design, &options)?;
     let mut text = exported.to_string();
-    text += &warnings::text(exported.misfit.as_slice());
+    let misfit: Vec<String> = exported.misfit.iter().map(ToString::to_string).collect();
+    text += &warnings::text(&misfit);
     Ok(text + &warnings::text(&made.warnings))
 }
 
