@@ -7,7 +7,7 @@ use ftc_control::Controller;
 use ftc_design::Design;
 use ftc_plant::TruePlant;
 use ftc_plant::deviation::{Deviation, Load, Port, Told};
-use ftc_plant::scenario::{FaultEvent, FaultKind, ModeInterval, first_tick};
+use ftc_plant::scenario::{FaultEvent, FaultKind, ModeInterval, NEVER, first_tick};
 use ftc_simulate::{PlantSimulator, Trajectory, Variant, run};
 
 const PLANTS: usize = 40;
@@ -195,7 +195,7 @@ impl Case {
         let load = |at, size| Load {
             at,
             from: seconds(CHANGE),
-            until: f64::INFINITY,
+            until: NEVER,
             size,
         };
         match change {

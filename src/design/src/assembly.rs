@@ -4,7 +4,7 @@ use super::commissioning::{self, Database, RecordedDisturbance};
 pub use super::estimator_spec::{DatabaseSource, EstimatorSpec, LONGEST_DEBOUNCE, Threshold};
 use super::grey_box::{self, Fit, Unusable};
 use super::harmonics;
-pub use super::harmonics::KnownDisturbance;
+pub use super::harmonics::{DisturbanceError, KnownDisturbance};
 use super::hypotheses;
 use super::{
     CertificateError, ControlSpec, ControllerDesign, Design, DesignError, DesignRecord, Failure,
@@ -114,6 +114,7 @@ pub fn assemble_with(request: Request, run: &Run) -> Result<Design, Failure> {
     check_operating_inputs(&request.plant, &request.signals.inputs).map_err(DesignError::from)?;
     let asked = request.estimator.check(dims);
     asked.map_err(DesignError::from)?;
+    check_experiment(&request, dims).map_err(DesignError::from)?;
     let estimator = estimator(&request, dims).map_err(DesignError::from)?;
     let scaling = request.signals.scaling();
     check_controllable(&request.plant, &request.control, &scaling)
@@ -156,6 +157,18 @@ pub fn assemble_with(request: Request, run: &Run) -> Result<Design, Failure> {
     let follows = coverage::check(&design);
     follows.map_err(|error| DesignError::from(CertificateError::malformed(error)))?;
     Ok(design)
+}
+
+/// Refuses a disturbance, an experiment or a true plant that does not fit the plant.
+fn check_experiment(request: &Request, dims: Dimensions) -> Result<(), RequestError> {
+    let plant = &request.plant;
+    if let Some(known) = &request.estimator.disturbance {
+        known.check(plant.sample_time, dims.disturbances)?;
+    }
+    let (modes, tracked) = (plant.modes.len(), request.control.tracked.len());
+    request.scenario.check(dims, modes, tracked)?;
+    let (_, deviation) = request.true_plant.clone().into_parts();
+    Ok(deviation.check(plant)?)
 }
 
 /// Refuses an operating point whose input lies beyond its limits: no controller could hold it.

@@ -6,8 +6,10 @@
 //! initial value than zero where the model is approximate.
 
 use super::units::power_of_two;
+use super::words::counted;
 use core::f64::consts::TAU;
-use ftc_control::parameters::{KnownPeriod, PhasorMap};
+use ftc_control::parameters::{KnownPeriod, MOST_HARMONICS, PhasorMap};
+use ftc_plant::number::{NumberError, not_negative, positive};
 use ftc_plant::{Mode, SwitchedPlant};
 use ftc_record::plain;
 use nalgebra::{Complex, DMatrix, DVector};
@@ -24,7 +26,83 @@ pub struct KnownDisturbance {
     pub amplitude: Option<Vec<f64>>,
 }
 
+/// Why a disturbance cannot be learned. Channels count from 1.
+#[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum DisturbanceError {
+    /// The period is not positive.
+    #[error("the period of the disturbance {0}")]
+    Period(NumberError),
+    /// No harmonic, or too many.
+    #[error("the disturbance has {}: give 1 to {MOST_HARMONICS}", counted(*.0, "harmonic", "harmonics"))]
+    Harmonics(usize),
+    /// The shortest period of its harmonics is not above two samples.
+    #[error(
+        "the period of the disturbance is {period}, but with {} it has to be above {} seconds at this sample time: give \
+         a longer period, fewer harmonics or a shorter sample time",
+        counted(*.harmonics, "harmonic", "harmonics"), .above
+    )]
+    TooShort {
+        /// The period in seconds.
+        period: f64,
+        /// Harmonics.
+        harmonics: usize,
+        /// What it has to be above, in seconds.
+        above: f64,
+    },
+    /// Not one amplitude for each channel.
+    #[error("the disturbance has {}: give {needed}", counted(*.found, "amplitude", "amplitudes"))]
+    AmplitudeCount {
+        /// Amplitudes found.
+        found: usize,
+        /// Channels.
+        needed: usize,
+    },
+    /// An amplitude is negative or no number.
+    #[error("the amplitude of disturbance {channel} {error}")]
+    Amplitude {
+        /// The channel.
+        channel: usize,
+        /// What is wrong with it.
+        error: NumberError,
+    },
+}
+
 impl KnownDisturbance {
+    /// Whether a controller sampled every `sample_time` seconds can learn it, where it has so many `channels`.
+    ///
+    /// # Errors
+    /// The first number that is out of its range.
+    pub fn check(&self, sample_time: f64, channels: usize) -> Result<(), DisturbanceError> {
+        positive(self.period).map_err(DisturbanceError::Period)?;
+        if !(1..=MOST_HARMONICS).contains(&self.harmonics) {
+            return Err(DisturbanceError::Harmonics(self.harmonics));
+        }
+        // Of anything shorter no sample tells one harmonic from another.
+        let shortest = 2.0 * sample_time;
+        if self.period / self.harmonics as f64 <= shortest {
+            return Err(DisturbanceError::TooShort {
+                period: self.period,
+                harmonics: self.harmonics,
+                above: shortest * self.harmonics as f64,
+            });
+        }
+        let amplitude = self.amplitude.as_deref().unwrap_or_default();
+        if self.amplitude.is_some() && amplitude.len() != channels {
+            return Err(DisturbanceError::AmplitudeCount {
+                found: amplitude.len(),
+                needed: channels,
+            });
+        }
+        for (at, &size) in amplitude.iter().enumerate() {
+            not_negative(size).map_err(|error| DisturbanceError::Amplitude {
+                channel: at + 1,
+                error,
+            })?;
+        }
+        Ok(())
+    }
+
     /// The fundamental alone, of a period in seconds; its size is not known.
     pub fn new(period: f64) -> Self {
         Self {
@@ -165,6 +243,56 @@ mod tests {
         let scalar = |v| DMatrix::from_element(1, 1, v);
         Mode::new(scalar(pole), scalar(1.0), scalar(1.0))
             .with_disturbance(scalar(gain), scalar(0.0))
+    }
+
+    #[test]
+    fn a_disturbance_that_cannot_be_learned_is_refused_with_what_would_do() {
+        let said = |period, harmonics, amplitude: Option<Vec<f64>>| {
+            let mut known = KnownDisturbance::new(period);
+            known.harmonics = harmonics;
+            known.amplitude = amplitude;
+            let found = known.check(0.5, 2);
+            found.map_err(|error| error.to_string())
+        };
+        assert_eq!(said(3.1, 3, Some(vec![0.0, 1.0])), Ok(()));
+        let cases: [(f64, usize, Option<Vec<f64>>, &str); 7] = [
+            (
+                0.0,
+                1,
+                None,
+                "the period of the disturbance is 0: give a positive number",
+            ),
+            (f64::NAN, 1, None, "the period of the disturbance is NaN"),
+            (
+                9.0,
+                0,
+                None,
+                "the disturbance has 0 harmonics: give 1 to 50",
+            ),
+            (99.0, 51, None, "the disturbance has 51 harmonics"),
+            (
+                3.0,
+                3,
+                None,
+                "the period of the disturbance is 3, but with 3 harmonics it has to be above 3 seconds",
+            ),
+            (
+                9.0,
+                1,
+                Some(vec![1.0]),
+                "the disturbance has 1 amplitude: give 2",
+            ),
+            (
+                9.0,
+                1,
+                Some(vec![1.0, -1.0]),
+                "the amplitude of disturbance 2 is -1: give 0",
+            ),
+        ];
+        for (period, harmonics, amplitude, words) in cases {
+            let said = said(period, harmonics, amplitude).expect_err(words);
+            assert!(said.starts_with(words), "{said}");
+        }
     }
 
     /// Simulated steady responses of two modes to the same sine are related by the map.

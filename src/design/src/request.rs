@@ -2,10 +2,12 @@
 
 use super::commissioning::CommissioningError;
 use super::controllability::Uncontrollable;
+use super::harmonics::DisturbanceError;
 use super::spec::SpecError;
 use super::words::{counted, entering, interval, least_decay};
 use super::work::TooLarge;
-use ftc_plant::PlantError;
+use ftc_plant::deviation::DeviationError;
+use ftc_plant::{PlantError, ScenarioError};
 
 /// What is wrong with a request. Modes and inputs count from 1.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -17,6 +19,15 @@ pub enum RequestError {
     /// A number that is asked for is out of its range.
     #[error(transparent)]
     Spec(#[from] SpecError),
+    /// The disturbance that is said to be known cannot be learned.
+    #[error(transparent)]
+    Disturbance(#[from] DisturbanceError),
+    /// The experiment cannot be played on the plant.
+    #[error(transparent)]
+    Scenario(#[from] ScenarioError),
+    /// The true plant departs from the plant in a way that does not fit it.
+    #[error(transparent)]
+    Deviation(#[from] DeviationError),
     /// The inputs cannot do what is asked.
     #[error(transparent)]
     Uncontrollable(#[from] Uncontrollable),

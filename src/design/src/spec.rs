@@ -4,6 +4,7 @@ use super::Lyapunov;
 use super::words::counted;
 use core::f64::consts::{PI, TAU};
 use ftc_plant::Dimensions;
+pub use ftc_plant::number::{LARGEST, SMALLEST};
 use ftc_plant::scaling::Scaling;
 use serde::{Deserialize, Serialize};
 use std::fmt;
@@ -35,13 +36,6 @@ pub struct ControlSpec {
     /// `W_u`: weight of each input (m), per physical unit.
     pub input_weight: Vec<f64>,
 }
-
-/// The largest magnitude of a weight, an operating point, a threshold or any other number that is asked for: no physical
-/// quantity in reasonable units is larger, and beyond it products overflow.
-pub const LARGEST: f64 = 1e15;
-
-/// The smallest magnitude of a number that is to be positive: beyond it quotients overflow.
-pub const SMALLEST: f64 = 1.0 / LARGEST;
 
 /// The longest latency in samples.
 pub const LONGEST_LATENCY: usize = 1;

@@ -1,6 +1,7 @@
 //! How a true plant departs from the model that describes it, apart from its matrices.
 
-use crate::scenario::{FaultEvent, first_tick};
+use crate::number::{self, NumberError};
+use crate::scenario::{FaultError, FaultEvent, IntervalError, first_tick, interval};
 use crate::{Mode, SwitchedPlant};
 use chacha20::ChaCha8Rng;
 use chacha20::rand_core::{Rng, SeedableRng};
@@ -89,7 +90,7 @@ impl Told {
 /// The longest delay of the sensors in samples.
 pub const LONGEST_DELAY: usize = 1000;
 
-/// Why a deviation does not fit a plant.
+/// Why a deviation does not fit a plant. Inputs, loads, faults and times count from 1.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum DeviationError {
@@ -101,22 +102,59 @@ pub enum DeviationError {
         /// Inputs of the plant.
         needed: usize,
     },
+    /// The gain of an input is no number of practical size.
+    #[error("the gain of input {input} {error}")]
+    InputGain {
+        /// The input.
+        input: usize,
+        /// What is wrong with it.
+        error: NumberError,
+    },
     /// A load acts on what does not exist.
     #[error("a load acts on {0}, which the plant does not have")]
     Load(Port),
-    /// An actuator fault names an input that does not exist.
-    #[error("an actuator fault names an input that the plant does not have")]
-    ActuatorFault,
+    /// A load begins or ends at no time.
+    #[error("load {load}: {error}")]
+    LoadInterval {
+        /// Which load.
+        load: usize,
+        /// What is wrong with it.
+        error: IntervalError,
+    },
+    /// The size of a load is no number of practical size.
+    #[error("load {load}: its size {error}")]
+    LoadSize {
+        /// Which load.
+        load: usize,
+        /// What is wrong with it.
+        error: NumberError,
+    },
+    /// An actuator fault is ill-formed, or at an input that does not exist.
+    #[error("actuator fault {fault}: {error}")]
+    ActuatorFault {
+        /// Which fault.
+        fault: usize,
+        /// What is wrong with it.
+        error: FaultError,
+    },
     /// The mode that is reported does not exist.
     #[error("a mode is told that the plant does not have")]
     ReportedMode,
+    /// Another mode is told from or until no time.
+    #[error("mode told {told}: {error}")]
+    Told {
+        /// Which of the times.
+        told: usize,
+        /// What is wrong with it.
+        error: IntervalError,
+    },
     /// The readings are too late (samples).
     #[error("the sensors are {0} samples late: give at most {LONGEST_DELAY}")]
     SensorDelay(usize),
 }
 
 impl Deviation {
-    /// Whether every index and size fits this plant.
+    /// Whether every index, size and time fits this plant.
     ///
     /// # Errors
     /// What does not fit.
@@ -128,20 +166,45 @@ impl Deviation {
                 needed: dims.inputs,
             });
         }
-        let misplaced = self.loads.iter().find(|load| match load.at {
-            Port::Input(at) => at >= dims.inputs,
-            Port::Disturbance(at) => at >= dims.disturbances,
-            Port::State(at) => at >= dims.states,
-        });
-        if let Some(load) = misplaced {
-            return Err(DeviationError::Load(load.at));
+        if let Some((at, error)) = number::first(&self.input_gain, number::number) {
+            let input = at + 1;
+            return Err(DeviationError::InputGain { input, error });
         }
-        let mut faults = self.actuator_faults.iter();
-        if faults.any(|fault| fault.sensor >= dims.inputs) {
-            return Err(DeviationError::ActuatorFault);
+        for (at, load) in self.loads.iter().enumerate() {
+            let there = match load.at {
+                Port::Input(at) => at < dims.inputs,
+                Port::Disturbance(at) => at < dims.disturbances,
+                Port::State(at) => at < dims.states,
+            };
+            if !there {
+                return Err(DeviationError::Load(load.at));
+            }
+            let load_at = at + 1;
+            interval(load.from, load.until).map_err(|error| DeviationError::LoadInterval {
+                load: load_at,
+                error,
+            })?;
+            number::number(load.size).map_err(|error| DeviationError::LoadSize {
+                load: load_at,
+                error,
+            })?;
         }
-        if self.told.iter().any(|told| told.mode >= plant.modes.len()) {
-            return Err(DeviationError::ReportedMode);
+        for (at, fault) in self.actuator_faults.iter().enumerate() {
+            let ill_formed = |error| DeviationError::ActuatorFault {
+                fault: at + 1,
+                error,
+            };
+            fault.check(dims.inputs).map_err(ill_formed)?;
+        }
+        for (at, told) in self.told.iter().enumerate() {
+            if told.mode >= plant.modes.len() {
+                return Err(DeviationError::ReportedMode);
+            }
+            let ill_formed = |error| DeviationError::Told {
+                told: at + 1,
+                error,
+            };
+            interval(told.from, told.until).map_err(ill_formed)?;
         }
         if self.sensor_delay > LONGEST_DELAY {
             return Err(DeviationError::SensorDelay(self.sensor_delay));
@@ -214,6 +277,7 @@ impl SwitchedPlant {
 mod tests {
     use super::*;
     use crate::OperatingPoint;
+    use crate::scenario::FaultKind;
     use nalgebra::dmatrix;
 
     fn plant() -> SwitchedPlant {
@@ -276,5 +340,45 @@ mod tests {
             ..Deviation::default()
         };
         assert!(told.check(&plant()).is_err());
+    }
+
+    #[test]
+    fn what_has_no_size_or_no_time_is_refused() {
+        let said = |deviation: Deviation| deviation.check(&plant()).unwrap_err().to_string();
+        let (at, size) = (Port::State(0), 1.0);
+        let load = |from, until, size| Deviation {
+            loads: vec![Load {
+                at,
+                from,
+                until,
+                size,
+            }],
+            ..Deviation::default()
+        };
+        assert!(load(0.0, 1.0, size).check(&plant()).is_ok());
+        assert!(said(load(2.0, 1.0, size)).starts_with("load 1: it ends at 1: "));
+        assert!(said(load(f64::NAN, 1.0, size)).starts_with("load 1: it begins at NaN: "));
+        assert!(said(load(0.0, 1.0, f64::NAN)).starts_with("load 1: its size is NaN: "));
+        let (from, until, mode) = (-1.0, 1.0, 0);
+        let told = Deviation {
+            told: vec![Told { from, until, mode }],
+            ..Deviation::default()
+        };
+        assert!(said(told).starts_with("mode told 1: it begins at -1: "));
+        let actuator = Deviation {
+            actuator_faults: vec![FaultEvent {
+                sensor: 1,
+                from: 0.0,
+                until: 1.0,
+                kind: FaultKind::Stuck,
+            }],
+            ..Deviation::default()
+        };
+        assert!(said(actuator).starts_with("actuator fault 1: it is at channel 2 of 1"));
+        let gain = Deviation {
+            input_gain: vec![f64::INFINITY],
+            ..Deviation::default()
+        };
+        assert!(said(gain).starts_with("the gain of input 1 is inf: "));
     }
 }

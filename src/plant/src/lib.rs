@@ -33,6 +33,7 @@ mod dimensions;
 mod eigenvalues;
 mod error;
 pub mod noise;
+pub mod number;
 pub mod rectifier;
 pub mod rows;
 pub mod scaling;
@@ -43,7 +44,7 @@ pub use deviation::Deviation;
 pub use dimensions::Dimensions;
 pub use eigenvalues::{eigenvalues, spectral_radius};
 pub use error::PlantError;
-pub use scenario::Scenario;
+pub use scenario::{Scenario, ScenarioError};
 pub use true_plant::TruePlant;
 
 use nalgebra::{DMatrix, DVector};

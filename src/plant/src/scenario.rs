@@ -1,7 +1,18 @@
 //! What happens to the plant: mode schedule, references, sensor faults, disturbance, noise.
 
+mod check;
+
+pub(crate) use check::interval;
+pub use check::{Channels, FaultError, IntervalError, Quantity, ScenarioError, WaveformError};
+
 use crate::Dimensions;
 use serde::{Deserialize, Serialize};
+
+/// The most samples of a scenario.
+pub const MOST_STEPS: u64 = 1_000_000;
+
+/// An end, in seconds, that never comes.
+pub const NEVER: f64 = f64::MAX;
 
 /// A complete experiment; every signal is a pure function of the tick.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -196,11 +207,10 @@ impl Waveform {
     /// Zero at every sample.
     pub const ZERO: Self = Self::Constant { value: 0.0 };
 
-    /// Its least and its largest value in the first `steps` ticks, of which a million are looked at; infinite
+    /// Its least and its largest value in the first `steps` ticks, of which [`MOST_STEPS`] are looked at; infinite
     /// the wrong way round if there are none.
     pub fn range(&self, steps: u64, sample_time: f64) -> [f64; 2] {
-        const LOOKED_AT: u64 = 1_000_000;
-        let values = (0..steps.min(LOOKED_AT)).map(|tick| self.at(tick, sample_time));
+        let values = (0..steps.min(MOST_STEPS)).map(|tick| self.at(tick, sample_time));
         values.fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], value| {
             [low.min(value), high.max(value)]
         })
@@ -250,12 +260,16 @@ impl Waveform {
 }
 
 impl Scenario {
-    /// So many samples in the first mode under a reference (r), without noise, fault and disturbance.
+    /// The seed where no other is asked for.
+    pub const SEED: u64 = 1;
+
+    /// So many samples in the first mode under a reference (r), without noise, fault and disturbance;
+    /// [`Scenario::check`] says whether it can be played on a plant.
     pub fn new(steps: u64, reference: Vec<Waveform>, dims: Dimensions) -> Self {
         Self {
             steps,
             noise: vec![0.0; dims.outputs],
-            seed: 1,
+            seed: Self::SEED,
             schedule: vec![ModeInterval { from: 0.0, mode: 0 }],
             reference,
             fault: vec![Waveform::ZERO; dims.outputs],

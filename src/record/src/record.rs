@@ -9,7 +9,7 @@ use ftc_plant::SwitchedPlant;
 use ftc_plant::deviation::DeviationError;
 use ftc_plant::scaling::Scaling;
 use ftc_plant::{Dimensions, PlantError};
-use ftc_plant::{Scenario, TruePlant};
+use ftc_plant::{Scenario, ScenarioError, TruePlant};
 use serde::{Deserialize, Serialize};
 
 /// Version of the record's layout; an FMU refuses a record of another.
@@ -184,9 +184,9 @@ pub enum RecordError {
     /// An output is tracked that does not exist; the number of outputs.
     #[error("the design tracks an output beyond its {0}")]
     Tracked(usize),
-    /// The schedule names a mode that does not exist; the number of modes.
-    #[error("the schedule names a mode beyond the plant's {0}")]
-    Schedule(usize),
+    /// The scenario cannot be played on the plant.
+    #[error(transparent)]
+    Scenario(#[from] ScenarioError),
     /// The deviation does not fit the plant.
     #[error(transparent)]
     Deviation(#[from] DeviationError),
@@ -242,20 +242,13 @@ impl DesignRecord {
         let dims = Dimensions::check(plant)?;
         self.check_counts(dims)?;
         let modes = plant.modes.len();
-        let scenario = &self.scenario;
         let tracked = &self.controller.feedback.tracked;
         let memory = self.controller.estimator.check_memory(dims.inputs);
         memory.map_err(RecordError::Memory)?;
         if tracked.iter().any(|&row| row >= dims.outputs) {
             return Err(RecordError::Tracked(dims.outputs));
         }
-        if scenario
-            .schedule
-            .iter()
-            .any(|interval| interval.mode >= modes)
-        {
-            return Err(RecordError::Schedule(modes));
-        }
+        self.scenario.check(dims, modes, tracked.len())?;
         let (motion, deviation) = self.true_plant.clone().into_parts();
         deviation.check(plant)?;
         if let TruePlant::Linear { plant: truth } = &motion
@@ -269,8 +262,6 @@ impl DesignRecord {
     /// Whether there is one of everything that the plant's sizes ask for.
     fn check_counts(&self, dims: Dimensions) -> Result<(), RecordError> {
         let modes = self.plant.modes.len();
-        let scenario = &self.scenario;
-        let tracked = &self.controller.feedback.tracked;
         let predicted = match self.controller.estimator.method {
             EstimatorMethod::Reference => modes,
             EstimatorMethod::Observer | EstimatorMethod::Sliding | EstimatorMethod::None => {
@@ -304,14 +295,6 @@ impl DesignRecord {
                 "thresholds",
                 self.controller.estimator.thresholds.len(),
                 dims.outputs,
-            ),
-            ("noise levels", scenario.noise.len(), dims.outputs),
-            ("references", scenario.reference.len(), tracked.len()),
-            ("faults", scenario.fault.len(), dims.outputs),
-            (
-                "disturbances",
-                scenario.disturbance.len(),
-                dims.disturbances,
             ),
         ] {
             if found != needed {

@@ -6,6 +6,7 @@ use crate::closed_loop::visit;
 use crate::plant::PlantSimulator;
 use ftc_control::Controller;
 use ftc_plant::deviation::{Load, Port};
+use ftc_plant::scenario::NEVER;
 use ftc_plant::{Deviation, Dimensions, TruePlant};
 use ftc_record::DesignRecord;
 
@@ -179,7 +180,7 @@ fn deviation(design: &DesignRecord, departure: Departure) -> Deviation {
         Departure::Step { at, size } => deviation.loads.push(Load {
             at,
             from: (design.scenario.steps / 2) as f64 * design.plant.sample_time,
-            until: f64::MAX,
+            until: NEVER,
             size,
         }),
         Departure::LateReadings => deviation.sensor_delay += 1,

@@ -24,13 +24,12 @@ use ftc_design::spec::LONGEST_LATENCY;
 use ftc_design::words::counted;
 use ftc_design::{ControlSpec, Lyapunov, Objective, ObserverSpec, Signal, Signals};
 use ftc_plant::scaling::{Known, Scaling};
+use ftc_plant::scenario::MOST_STEPS;
 use ftc_plant::{Dimensions, OperatingPoint, SwitchedPlant};
 use std::path::Path;
 
 /// The largest number of states, inputs, outputs, disturbances or modes.
 pub(crate) const LARGEST_SIZE: usize = 64;
-/// The most samples of a scenario.
-pub(crate) const MOST_STEPS: usize = 1_000_000;
 
 /// Checks a design file and turns it into a request; other files are sought in `folder`, and `notes`
 /// gets what the user should know of them.
@@ -83,7 +82,7 @@ pub(crate) fn request(
         tables: Tables {
             folder,
             sample_time: plant.sample_time,
-            most_samples: MOST_STEPS,
+            most_samples: MOST_STEPS as usize,
             notes,
         },
         end: true_plant::end(file),
@@ -380,52 +379,14 @@ fn disturbance(file: &DesignFile, dims: Dimensions) -> Result<Option<KnownDistur
     let Some(given) = &file.disturbance else {
         return Ok(None);
     };
-    at("disturbance.period", check::positive(given.period))?;
     let mut disturbance = KnownDisturbance::new(given.period);
-    let shortest = 2.0 * file.sample_time;
-    let harmonics = match given.harmonics {
-        None => disturbance.harmonics,
-        Some(count) => {
-            let count = i64::try_from(count).unwrap_or(i64::MAX);
-            at(
-                "disturbance.harmonics",
-                check::count(count, 1, parameters::MOST_HARMONICS),
-            )?
-        }
-    };
-    if given.period / harmonics as f64 <= shortest {
-        let fewer = match harmonics {
-            1 => String::new(),
-            _ => format!(" with {harmonics} harmonics"),
-        };
-        return Err(Complaint::of(
-            "disturbance.period",
-            format!(
-                "is {}, but{fewer} it has to be above {} seconds at this sample_time: give a longer period{}, or choose a \
-                 shorter sample_time",
-                given.period,
-                shortest * harmonics as f64,
-                if harmonics > 1 {
-                    ", set fewer disturbance.harmonics"
-                } else {
-                    ""
-                }
-            ),
-        ));
+    disturbance.harmonics = given.harmonics.unwrap_or(disturbance.harmonics);
+    if let Some(amplitude) = &given.amplitude {
+        let values = at("disturbance.amplitude", amplitude.spread(dims.disturbances))?;
+        disturbance.amplitude = Some(values);
     }
-    let amplitude = match &given.amplitude {
-        None => None,
-        Some(amplitude) => {
-            let values = at("disturbance.amplitude", amplitude.spread(dims.disturbances))?;
-            at(
-                "disturbance.amplitude",
-                check::each(&values, check::not_negative),
-            )?;
-            Some(values)
-        }
-    };
-    disturbance.harmonics = harmonics;
-    disturbance.amplitude = amplitude;
+    let checked = disturbance.check(file.sample_time, dims.disturbances);
+    checked.map_err(|error| wording::of_disturbance(&error))?;
     Ok(Some(disturbance))
 }
 

@@ -1,8 +1,8 @@
 //! What a value must satisfy, whatever key it stands under.
 
 use crate::sentence::shorten;
-use ftc_design::spec::{LARGEST, SMALLEST};
 use ftc_design::words::counted;
+pub use ftc_plant::number::{NumberError, fraction, not_negative, number, positive};
 
 /// Longest name of a design, in bytes.
 const LONGEST_NAME: usize = 64;
@@ -11,21 +11,9 @@ const LONGEST_NAME: usize = 64;
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum ValueError {
-    /// Infinite, no number, or of impractical size.
-    #[error("is {0:e}: give a finite number of magnitude up to {LARGEST:e}")]
-    Number(f64),
-    /// Positive, but too small.
-    #[error("is {0:e}: give a number of at least {SMALLEST:e}")]
-    TooSmall(f64),
-    /// Zero or below, where only positive numbers make sense.
-    #[error("is {0}: give a positive number")]
-    NotPositive(f64),
-    /// Below zero.
-    #[error("is {0}: give 0 or a positive number")]
-    Negative(f64),
-    /// No share of a whole.
-    #[error("is {0}: give a fraction from 0 to 1")]
-    Fraction(f64),
+    /// One that nothing may have.
+    #[error(transparent)]
+    Number(#[from] NumberError),
     /// A number beyond its bounds.
     #[error("is {value}: give a number from {} to {}", short(*.least), short(*.most))]
     Range {
@@ -106,55 +94,6 @@ fn short(value: f64) -> String {
     }
 }
 
-/// A finite number of practical size.
-///
-/// # Errors
-/// Any other.
-pub fn number(value: f64) -> Result<(), ValueError> {
-    match value.is_finite() && value.abs() <= LARGEST {
-        true => Ok(()),
-        false => Err(ValueError::Number(value)),
-    }
-}
-
-/// A number above zero.
-///
-/// # Errors
-/// Any other, and one too small to divide by.
-pub fn positive(value: f64) -> Result<(), ValueError> {
-    number(value)?;
-    if value >= SMALLEST {
-        Ok(())
-    } else if value > 0.0 {
-        Err(ValueError::TooSmall(value))
-    } else {
-        Err(ValueError::NotPositive(value))
-    }
-}
-
-/// A number that is not negative.
-///
-/// # Errors
-/// Any other.
-pub fn not_negative(value: f64) -> Result<(), ValueError> {
-    number(value)?;
-    match value >= 0.0 {
-        true => Ok(()),
-        false => Err(ValueError::Negative(value)),
-    }
-}
-
-/// A share of a whole.
-///
-/// # Errors
-/// Any other.
-pub fn fraction(value: f64) -> Result<(), ValueError> {
-    match (0.0..=1.0).contains(&value) {
-        true => Ok(()),
-        false => Err(ValueError::Fraction(value)),
-    }
-}
-
 /// A count between two bounds.
 ///
 /// # Errors
@@ -192,7 +131,7 @@ pub fn index(number: i64, total: usize, things: &str) -> Result<usize, ValueErro
 ///
 /// # Errors
 /// The first that fails.
-pub fn each(values: &[f64], check: fn(f64) -> Result<(), ValueError>) -> Result<(), ValueError> {
+pub fn each(values: &[f64], check: fn(f64) -> Result<(), NumberError>) -> Result<(), NumberError> {
     values.iter().try_for_each(|&value| check(value))
 }
 

@@ -48,9 +48,11 @@
 //! | `scenario.plant.continuous` | as `continuous` of the file |
 //! | `scenario.plant` | the plant is what it was designed for |
 
+use ftc_plant::Scenario;
+
 /// `controller.internal_model`
 pub const INTERNAL_MODEL: bool = false;
 /// `scenario.steps`
 pub const STEPS: u64 = 1000;
 /// `scenario.seed`
-pub const SEED: u64 = 1;
+pub const SEED: u64 = Scenario::SEED;

@@ -1,8 +1,7 @@
 //! Faults of sensors and actuators, as the user writes them.
 
-use crate::check;
 use crate::complaint::{Complaint, at};
-use crate::signal::{endless, finite, interval, only, positive, present};
+use crate::signal::{never, only, present};
 use crate::values::Which;
 use ftc_plant::scenario::{FaultEvent, FaultKind};
 use serde::Deserialize;
@@ -16,7 +15,7 @@ pub struct Event {
     input: Option<Which>,
     /// Seconds.
     from: f64,
-    #[serde(default = "endless")]
+    #[serde(default = "never")]
     until: f64,
     size: Option<f64>,
     slope: Option<f64>,
@@ -98,25 +97,22 @@ impl Event {
     fn fault_of(&self, what: &str, names: &[&str], things: &str) -> Result<FaultEvent, Complaint> {
         let (name, keys) = self.kind.keys();
         only(name, keys, &self.given())?;
-        let size = || present("size", self.size).and_then(|size| finite("size", size));
+        let size = || present("size", self.size);
         let kind = match self.kind {
             Kind::Bias => FaultKind::Bias { size: size()? },
             Kind::Drift => FaultKind::Drift {
-                slope: finite("slope", present("slope", self.slope)?)?,
+                slope: present("slope", self.slope)?,
             },
-            Kind::GainLoss => {
-                let loss = present("loss", self.loss)?;
-                at("loss", check::fraction(loss))?;
-                FaultKind::GainLoss { loss }
-            }
+            Kind::GainLoss => FaultKind::GainLoss {
+                loss: present("loss", self.loss)?,
+            },
             Kind::Stuck => FaultKind::Stuck,
             Kind::Intermittent => FaultKind::Intermittent {
                 size: size()?,
-                period: positive("period", present("period", self.period)?)?,
+                period: present("period", self.period)?,
             },
             Kind::Dropout => FaultKind::Dropout,
         };
-        interval(self.from, self.until)?;
         Ok(FaultEvent {
             sensor: at(what, self.place(what)?.index(names, things))?,
             from: self.from,

@@ -1,6 +1,6 @@
 //! The experiment that a design file asks for.
 
-use crate::assemble::{MOST_STEPS, names};
+use crate::assemble::names;
 use crate::check;
 use crate::complaint::{Complaint, Key, at};
 use crate::defaults;
@@ -8,10 +8,10 @@ use crate::schema;
 use crate::signal::{Signal as SignalOverTime, Tables};
 use crate::true_plant::{beyond_the_end, mode_names};
 use crate::values::Which;
+use crate::wording::of_scenario;
 use ftc_design::Signals;
 use ftc_design::assembly::KnownDisturbance;
-use ftc_design::words::counted;
-use ftc_plant::scenario::{ModeInterval, Waveform};
+use ftc_plant::scenario::{MOST_STEPS, ModeInterval, Waveform};
 use ftc_plant::{Dimensions, Scenario, SwitchedPlant};
 
 /// Everything the scenario depends on.
@@ -31,44 +31,42 @@ impl ScenarioContext<'_> {
     pub(crate) fn resolve(&self) -> Result<Scenario, Complaint> {
         let given = self.scenario;
         let steps = given.steps.map_or(Ok(defaults::STEPS), |steps| {
-            at("scenario.steps", check::count(steps, 1, MOST_STEPS)).map(|steps| steps as u64)
+            let steps = check::count(steps, 1, MOST_STEPS as usize);
+            at("scenario.steps", steps).map(|steps| steps as u64)
         })?;
         let seed = given.seed.map_or(Ok(defaults::SEED), |seed| {
             at("scenario.seed", check::seed(seed))
         })?;
         let (outputs, disturbances) = (self.dims.outputs, self.dims.disturbances);
         let schedule = self.schedule()?;
-        let first = schedule[0].mode;
+        let first = schedule.first().map_or(0, |interval| interval.mode);
         let noise = self.noise()?;
-        let tracked = (self.tracked.len(), "tracked output");
+        let tracked = self.tracked.len();
         let reference = self.channels("reference", &given.reference, tracked, |at| {
             self.step(at, first, steps)
         })?;
         let mut scenario = Scenario::new(steps, reference, self.dims);
         scenario.noise = noise;
         scenario.seed = seed;
-        scenario.fault = self.channels("fault", &given.fault, (outputs, "output"), |_| {
-            Waveform::ZERO
-        })?;
-        scenario.disturbance = self.channels(
-            "disturbance",
-            &given.disturbance,
-            (disturbances, "disturbance"),
-            |at| self.expected_disturbance(at),
-        )?;
+        scenario.fault = self.channels("fault", &given.fault, outputs, |_| Waveform::ZERO)?;
+        scenario.disturbance =
+            self.channels("disturbance", &given.disturbance, disturbances, |at| {
+                self.expected_disturbance(at)
+            })?;
         scenario.events = self.events()?;
         scenario.schedule = schedule;
+        let modes = self.plant.modes.len();
+        let checked = scenario.check(self.dims, modes, tracked);
+        checked.map_err(|error| of_scenario(&error))?;
         Ok(scenario)
     }
 
     fn noise(&self) -> Result<Vec<f64>, Complaint> {
         let outputs = self.dims.outputs;
-        let Some(given) = &self.scenario.noise else {
-            return Ok(vec![0.0; outputs]);
-        };
-        let noise = at("scenario.noise", given.spread(outputs))?;
-        at("scenario.noise", check::each(&noise, check::not_negative))?;
-        Ok(noise)
+        match &self.scenario.noise {
+            None => Ok(vec![0.0; outputs]),
+            Some(given) => at("scenario.noise", given.spread(outputs)),
+        }
     }
 
     fn schedule(&self) -> Result<Vec<ModeInterval>, Complaint> {
@@ -77,23 +75,6 @@ impl ScenarioContext<'_> {
             mode: Which::Number(1),
         }];
         let given = self.scenario.schedule.as_deref().unwrap_or(&whole);
-        if given.first().is_none_or(|interval| interval.from != 0.0) {
-            return Err(Complaint::of(
-                "scenario.schedule",
-                "must start at time 0: let its first entry say from = 0",
-            ));
-        }
-        let ascending =
-            |pair: &[schema::ModeInterval]| pair[0].from < pair[1].from && pair[1].from.is_finite();
-        if let Some(pair) = given.windows(2).find(|pair| !ascending(pair)) {
-            return Err(Complaint::of(
-                "scenario.schedule",
-                format!(
-                    "goes from time {} to {}: give the times in ascending order",
-                    pair[0].from, pair[1].from
-                ),
-            ));
-        }
         let names = mode_names(self.plant);
         let resolve = |(entry, interval): (usize, &schema::ModeInterval)| {
             let key = Key::from("scenario.schedule").entry(entry);
@@ -112,22 +93,13 @@ impl ScenarioContext<'_> {
         &self,
         name: &str,
         given: &Option<Vec<SignalOverTime>>,
-        (size, channel): (usize, &str),
+        size: usize,
         default: impl Fn(usize) -> Waveform,
     ) -> Result<Vec<Waveform>, Complaint> {
         let key = Key::from("scenario").then(name);
         let Some(given) = given else {
             return Ok((0..size).map(default).collect());
         };
-        if given.len() != size {
-            return Err(Complaint::of(
-                key,
-                format!(
-                    "has {}: give {size}, one per {channel}",
-                    counted(given.len(), "signal", "signals")
-                ),
-            ));
-        }
         let waveform = |(index, signal): (usize, &SignalOverTime)| {
             let waveform = signal.waveform(self.tables);
             waveform.map_err(|what| what.inside(key.clone().entry(index)))

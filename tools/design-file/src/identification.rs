@@ -237,7 +237,10 @@ pub fn identify(asked: &Asked) -> Result<Found, Error> {
     let name = name_of(&asked.out)?;
     for (key, value) in [("sample_time", asked.sample_time), ("period", asked.period)] {
         let checked = value.map_or(Ok(()), crate::check::positive);
-        checked.map_err(|what| Error::Value { key, what })?;
+        checked.map_err(|what| Error::Value {
+            key,
+            what: what.into(),
+        })?;
     }
     let files: Result<Vec<Read>, Error> = asked.logs.iter().map(|log| read(log, asked)).collect();
     let mut files = files?;

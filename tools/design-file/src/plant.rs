@@ -1,7 +1,7 @@
 //! The plant of a design file: its own matrices, those of a MATLAB or NumPy file, or a named model.
 
 use crate::assemble::LARGEST_SIZE;
-use crate::check::{self, ValueError};
+use crate::check::{self, NumberError};
 use crate::complaint::{Complaint, Key, at};
 use crate::notes::Notes;
 use crate::schema::{self, DesignFile, PlantModel};
@@ -518,7 +518,7 @@ fn unsound(matrix: &DMatrix<f64>) -> Option<String> {
         "the entry in row {}, column {} {}",
         entry % matrix.nrows() + 1,
         entry / matrix.nrows() + 1,
-        ValueError::Number(matrix[entry])
+        NumberError::NotFinite(matrix[entry])
     ))
 }
 

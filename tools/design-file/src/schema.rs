@@ -427,7 +427,7 @@ pub struct Told {
     /// Seconds.
     pub from: f64,
     /// Seconds.
-    #[serde(default = "crate::signal::endless")]
+    #[serde(default = "crate::signal::never")]
     pub until: f64,
     /// The mode.
     pub mode: Which,
@@ -446,7 +446,7 @@ pub struct Load {
     /// Seconds.
     pub from: f64,
     /// Seconds.
-    #[serde(default = "crate::signal::endless")]
+    #[serde(default = "crate::signal::never")]
     pub until: f64,
     /// What is added.
     pub size: f64,

@@ -3,8 +3,9 @@
 use crate::check;
 use crate::complaint::{Complaint, Key, at};
 use crate::notes::Notes;
+use crate::wording::of_waveform;
 use ftc_design::words::counted;
-use ftc_plant::scenario::Waveform;
+use ftc_plant::scenario::{NEVER, Waveform};
 use ftc_tables::{Clock, Interpolation, Table, find_time_column, resample};
 use serde::de::value::MapAccessDeserializer;
 use serde::de::{Deserialize, Deserializer, Error, MapAccess, Visitor};
@@ -100,9 +101,9 @@ pub struct Tables<'a> {
     pub notes: &'a Notes,
 }
 
-/// An end that never comes.
-pub(crate) fn endless() -> f64 {
-    f64::MAX
+/// The end of what has none.
+pub(crate) fn never() -> f64 {
+    NEVER
 }
 
 impl<'de> Deserialize<'de> for Signal {
@@ -141,7 +142,9 @@ impl Signal {
             Given::Table(table) => {
                 let (name, keys) = table.kind.keys();
                 only(name, keys, &table.given())?;
-                table.waveform(tables)
+                let waveform = table.waveform(tables)?;
+                waveform.check().map_err(|error| of_waveform(&error))?;
+                Ok(waveform)
             }
         }
     }
@@ -168,38 +171,31 @@ impl SignalTable {
     }
 
     fn waveform(&self, tables: Tables) -> Result<Waveform, Complaint> {
-        let needed = |key: &str, value: Option<f64>| finite(key, present(key, value)?);
-        let or_zero = |key: &str, value: Option<f64>| finite(key, value.unwrap_or(0.0));
-        let period = || positive("period", present("period", self.period)?);
+        let period = || present("period", self.period);
         Ok(match self.kind {
             Kind::Constant => Waveform::Constant {
-                value: needed("value", self.value)?,
+                value: present("value", self.value)?,
             },
             Kind::Steps => Waveform::Steps {
-                points: ascending(&pairs(present("points", self.points.as_ref())?)?)?,
+                points: pairs(present("points", self.points.as_ref())?)?,
             },
             Kind::Square => Waveform::Square {
-                amplitude: needed("amplitude", self.amplitude)?,
+                amplitude: present("amplitude", self.amplitude)?,
                 period: period()?,
-                offset: or_zero("offset", self.offset)?,
+                offset: self.offset.unwrap_or(0.0),
             },
             Kind::Sine => Waveform::Sine {
-                amplitude: needed("amplitude", self.amplitude)?,
+                amplitude: present("amplitude", self.amplitude)?,
                 period: period()?,
-                phase: or_zero("phase", self.phase)?,
-                offset: or_zero("offset", self.offset)?,
+                phase: self.phase.unwrap_or(0.0),
+                offset: self.offset.unwrap_or(0.0),
             },
-            Kind::Ramp => {
-                let from = self.from.unwrap_or(0.0);
-                let until = self.until.unwrap_or_else(endless);
-                interval(from, until)?;
-                Waveform::Ramp {
-                    value: or_zero("value", self.value)?,
-                    slope: needed("slope", self.slope)?,
-                    from,
-                    until,
-                }
-            }
+            Kind::Ramp => Waveform::Ramp {
+                value: self.value.unwrap_or(0.0),
+                slope: present("slope", self.slope)?,
+                from: self.from.unwrap_or(0.0),
+                until: self.until.unwrap_or(NEVER),
+            },
             Kind::Table => {
                 let path = tables.folder.join(present("file", self.file.as_ref())?);
                 let column = present("column", self.column.as_ref())?;
@@ -241,30 +237,6 @@ pub(crate) fn only(kind: &str, known: &[&str], given: &[(&str, bool)]) -> Result
     }
 }
 
-pub(crate) fn finite(key: &str, value: f64) -> Result<f64, Complaint> {
-    at(key, check::number(value)).map(|()| value)
-}
-
-pub(crate) fn positive(key: &str, value: f64) -> Result<f64, Complaint> {
-    at(key, check::positive(value)).map(|()| value)
-}
-
-pub(crate) fn interval(from: f64, until: f64) -> Result<(), Complaint> {
-    if !(from.is_finite() && from >= 0.0) {
-        return Err(Complaint::of(
-            "from",
-            format!("is {from}: give a time in seconds, 0 or later"),
-        ));
-    }
-    if !(until.is_finite() && until > from) {
-        return Err(Complaint::of(
-            "until",
-            format!("is {until}: give a time in seconds after from = {from}, or leave until out"),
-        ));
-    }
-    Ok(())
-}
-
 /// The entries of a list of points, each a time and a value.
 fn pairs(points: &[Vec<f64>]) -> Result<Vec<[f64; 2]>, Complaint> {
     let pair = |(index, point): (usize, &Vec<f64>)| {
@@ -279,27 +251,6 @@ fn pairs(points: &[Vec<f64>]) -> Result<Vec<[f64; 2]>, Complaint> {
         })
     };
     points.iter().enumerate().map(pair).collect()
-}
-
-/// The points of a step list, checked.
-fn ascending(points: &[[f64; 2]]) -> Result<Vec<[f64; 2]>, Complaint> {
-    let wrong = |what: String| Err(Complaint::of("points", what));
-    if points.is_empty() {
-        return wrong("is empty: give at least one [time, value] pair".into());
-    }
-    for [time, value] in points {
-        if !(time.is_finite() && *time >= 0.0) {
-            return wrong(format!("has the time {time}: give seconds, 0 or later"));
-        }
-        finite("points", *value)?;
-    }
-    match points.windows(2).find(|pair| pair[0][0] >= pair[1][0]) {
-        Some(pair) => wrong(format!(
-            "goes from time {} to {}: give the times in ascending order",
-            pair[0][0], pair[1][0]
-        )),
-        None => Ok(points.to_vec()),
-    }
 }
 
 impl Tables<'_> {

@@ -7,7 +7,7 @@ use crate::defaults;
 use crate::notes::Notes;
 use crate::plant::{Found, Others, is_continuous};
 use crate::schema::{self, DesignFile, PlantModel, TruePlant as Given};
-use crate::signal::{finite, interval};
+use crate::wording::of_deviation;
 use ftc_design::Signals;
 use ftc_plant::deviation::{LONGEST_DELAY, Load, Port, Told};
 use ftc_plant::{Deviation, SwitchedPlant, TruePlant};
@@ -119,21 +119,13 @@ fn deviation(
     let dims = found.plant.dimensions();
     let input_gain = match &given.input_gain {
         None => Vec::new(),
-        Some(gains) => {
-            let gains = at("scenario.plant.input_gain", gains.spread(dims.inputs))?;
-            at(
-                "scenario.plant.input_gain",
-                check::each(&gains, check::number),
-            )?;
-            gains
-        }
+        Some(gains) => at("scenario.plant.input_gain", gains.spread(dims.inputs))?,
     };
     let delay = |key: &str, samples: Option<i64>| {
         at(key, check::count(samples.unwrap_or(0), 0, LONGEST_DELAY))
     };
     let modes = mode_names(&found.plant);
     let told = each("told", &given.told, |told, key| {
-        interval(told.from, told.until)?;
         begins(key, told.from);
         Ok(Told {
             from: told.from,
@@ -157,6 +149,9 @@ fn deviation(
     })?;
     deviation.mode_delay = delay("scenario.plant.mode_delay", given.mode_delay)? as u64;
     deviation.told = told?;
+    deviation
+        .check(&found.plant)
+        .map_err(|error| of_deviation(&error))?;
     Ok(deviation)
 }
 
@@ -206,7 +201,6 @@ fn each<T, U>(
 }
 
 fn load(given: &schema::Load, names: &Names) -> Result<Load, Complaint> {
-    interval(given.from, given.until)?;
     let disturbances: Vec<&str> = names.disturbances.iter().map(AsRef::as_ref).collect();
     let port = match (&given.input, &given.disturbance, &given.state) {
         (Some(which), None, None) => {
@@ -229,6 +223,6 @@ fn load(given: &schema::Load, names: &Names) -> Result<Load, Complaint> {
         at: port,
         from: given.from,
         until: given.until,
-        size: finite("size", given.size)?,
+        size: given.size,
     })
 }

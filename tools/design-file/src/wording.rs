@@ -2,6 +2,10 @@
 //!
 //! Sentences in which nothing of a design file is named are the library's own.
 
+mod experiment;
+
+pub(crate) use experiment::{of_deviation, of_disturbance, of_scenario, of_waveform};
+
 use crate::check::ValueError;
 use crate::complaint::{Complaint, Key};
 use crate::sentence::shorten;
@@ -86,6 +90,9 @@ pub fn of_request(error: &RequestError, logs: Option<&NameOrList>) -> Complaint 
     match error {
         RequestError::Plant(error) => of_plant(error),
         RequestError::Spec(error) => of_spec(error),
+        RequestError::Disturbance(error) => of_disturbance(error),
+        RequestError::Scenario(error) => of_scenario(error),
+        RequestError::Deviation(error) => of_deviation(error),
         RequestError::Uncontrollable(error) => of_uncontrollable(error),
         RequestError::TooLarge(error) => of_too_large(error),
         RequestError::Commissioning(error) => of_commissioning(error),
