@@ -2,6 +2,7 @@
 
 use crate::error::ControllerError;
 use crate::estimator::hypotheses::{MOST_MODES, Sensors};
+use crate::kernel;
 use crate::matrix::Matrix;
 use crate::parameters::{
     ControllerParameters, Estimator, EstimatorMethod, Harmonics, Hypotheses, Limits,
@@ -34,7 +35,7 @@ fn length(field: impl Into<String>, found: usize, needed: usize) -> Checked {
 }
 
 fn finite(field: impl Into<String>, values: &[f64]) -> Checked {
-    match values.iter().all(|value| value.is_finite()) {
+    match kernel::finite(values) {
         true => Ok(()),
         false => Err(ControllerError::NotFinite {
             field: field.into(),

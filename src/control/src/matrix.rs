@@ -4,6 +4,7 @@ mod serial;
 
 pub(crate) use serial::upper_triangle;
 
+use crate::kernel;
 use alloc::vec;
 use alloc::vec::Vec;
 
@@ -136,7 +137,7 @@ impl Matrix {
 
     /// Whether every entry is a finite number.
     pub fn is_finite(&self) -> bool {
-        self.entries.iter().all(|entry| entry.is_finite())
+        kernel::finite(&self.entries)
     }
 
     /// Every entry multiplied by `factor`.

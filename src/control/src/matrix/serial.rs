@@ -78,7 +78,6 @@ fn read<const TRIANGLE: bool>(bytes: &[u8]) -> Option<Matrix> {
     let (entries, []) = rest.as_chunks() else {
         return None;
     };
-    let mut entries = entries.iter().map(|entry| f64::from_le_bytes(*entry));
     let needed = match TRIANGLE {
         true if rows == columns => rows.checked_mul(rows.checked_add(1)?)? / 2,
         true => return None,
@@ -87,8 +86,9 @@ fn read<const TRIANGLE: bool>(bytes: &[u8]) -> Option<Matrix> {
     if entries.len() != needed {
         return None;
     }
+    let number = |bytes: &[u8; 8]| f64::from_le_bytes(*bytes);
     if !TRIANGLE {
-        let entries = entries.collect();
+        let entries = entries.iter().map(number).collect();
         return Some(Matrix {
             rows,
             columns,
@@ -96,11 +96,12 @@ fn read<const TRIANGLE: bool>(bytes: &[u8]) -> Option<Matrix> {
         });
     }
     let mut matrix = Matrix::zeros(rows, columns);
-    let places = matrix.entries.chunks_exact_mut(rows.max(1)).enumerate();
-    let places = places.flat_map(|(column, entries)| entries.iter_mut().take(column + 1));
-    places
-        .zip(&mut entries)
-        .for_each(|(place, entry)| *place = entry);
+    let mut rest = entries;
+    for (column, places) in (matrix.entries.chunks_exact_mut(rows.max(1))).enumerate() {
+        let (these, others) = rest.split_at_checked(column + 1)?;
+        (places.iter_mut().zip(these)).for_each(|(place, entry)| *place = number(entry));
+        rest = others;
+    }
     Some(matrix)
 }
 
