@@ -92,9 +92,10 @@ browser: build
 		$(BROWSER)/campaign/campaign.html $(BROWSER)/tank/report.html $(BROWSER)/reproduce/paper.html $(BROWSER)/reproduce/converter.html \
 		$(BROWSER)/controller/documentation/index.html $(BROWSER)/plant/documentation/index.html
 
-# The demonstration needs FMPy alone, which takes less to install than all that the tests need; and, where no
-# program is built yet, one without the formats of others that it does not read, which takes a sixth less to
-# compile. What a later `make build` needs of it is not compiled twice (by cargo 1.91 or later).
+# The demonstration needs FMPy alone, and of its dependencies what a loop of FMUs imports. Where no program is built
+# yet, it compiles one without the formats of others, which it does not read, and with less optimisation of what it
+# hardly runs (tools/demo.toml): its design of the example takes a hundredth of a second more. A later `make build`
+# compiles these crates and the tools once more, and nothing else twice (by cargo 1.91 or later).
 DEMO := target/demo
 ifneq ($(wildcard target/release/ftc-fmu),)
 DEMO_PROGRAM := target/release
@@ -109,13 +110,13 @@ demo: $(DEMO)/python/ready
 
 .PHONY: $(DEMO)/program
 $(DEMO)/program:
-	CARGO_BUILD_BUILD_DIR=target cargo build --release --target-dir $(DEMO) --package ftc-fmu $(FMUS) --no-default-features
+	CARGO_BUILD_BUILD_DIR=target cargo build --release --target-dir $(DEMO) --package ftc-fmu $(FMUS) --no-default-features --config tools/demo.toml
 	tools/platforms/native.sh $(DEMO_PROGRAM)
 
 $(DEMO)/python/ready: tests/requirements.txt
 	rm -rf $(DEMO)/python
 	$(PYTHON) -m venv $(DEMO)/python
-	$(DEMO)/python/bin/pip install --quiet --disable-pip-version-check --no-compile --constraint tests/requirements.txt FMPy numpy
+	$(DEMO)/python/bin/pip install --quiet --disable-pip-version-check --no-compile --no-deps --constraint tests/requirements.txt FMPy attrs lxml numpy
 	touch $@
 
 bench: build $(VENV)/ready

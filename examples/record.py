@@ -2,7 +2,7 @@
 
 Usage: python3 examples/record.py DESIGN.toml
 
-Plays an operator: every input jumps at random to one of two values about the operating point, a
+Does what an operator may do: every input jumps at random to one of two values about the operating point, a
 nominal value apart. Inputs and noisy outputs are written to one CSV file per mode beside the
 design file. The same design always gives the same bytes.
 """

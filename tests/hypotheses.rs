@@ -146,6 +146,7 @@ fn flagged_samples(design: &Design) -> usize {
     flagged.count()
 }
 
+/// promise: no-false-alarms
 #[test]
 fn healthy_sensors_are_not_flagged() {
     for mut design in designs(13, 3) {

@@ -79,18 +79,18 @@ fn a_sine_is_followed_to_99_7_percent_and_with_the_internal_model_to_99_95() {
 fn residual(control: &ControlSpec, angle: f64) -> f64 {
     const STEPS: u64 = 6000;
     let design = design(Channel::State, control.clone());
-    let mut played = scenario(Waveform::Constant { value: 0.6 }, 0.0, 1);
-    played.steps = STEPS as _;
-    played.schedule = vec![ModeInterval { from: 0.0, mode: 1 }];
-    played.reference.truncate(control.tracked.len());
-    played.fault = vec![Waveform::Constant { value: 0.0 }; 2];
-    played.disturbance = vec![Waveform::Sine {
+    let mut experiment = scenario(Waveform::Constant { value: 0.6 }, 0.0, 1);
+    experiment.steps = STEPS as _;
+    experiment.schedule = vec![ModeInterval { from: 0.0, mode: 1 }];
+    experiment.reference.truncate(control.tracked.len());
+    experiment.fault = vec![Waveform::Constant { value: 0.0 }; 2];
+    experiment.disturbance = vec![Waveform::Sine {
         amplitude: 0.04,
         period: TAU / angle,
         phase: 0.3,
         offset: 0.0,
     }];
-    let simulator = PlantSimulator::new(plant(Channel::State), played);
+    let simulator = PlantSimulator::new(plant(Channel::State), experiment);
     let trajectory = run(
         &simulator,
         &Controller::new(design.parameters()).unwrap(),

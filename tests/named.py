@@ -21,7 +21,8 @@ FILE = re.compile(r"[\w*./-]*/[\w*.-]*|[\w*-]+\.(?:rs|py|sh|md|toml|json)|Makefi
 # Metaphors that names, comments and messages once held.
 METAPHORS = re.compile(
     rb"\b(?:Dice|dice|Lottery|lottery|hasty|blip|bearable|SILENCE|ROOM|HASTE|Road|Contender|slowest_step|thickened"
-    rb"|Trust|Truth|Play|Frame|lives on|leans on|hair of the|beyond suspicion|usual ways out|fault that hides)\b"
+    rb"|Trust|Truth|Play|Frame|lives on|leans on|hair of the|beyond suspicion|usual ways out|fault that hides"
+    rb"|played|struck|aside|Loosen|Tighten)\b"
 )
 SYMBOL = re.compile(r"[A-Za-z_]\w*(?:::\w+)*")
 

@@ -3,85 +3,154 @@
 use crate::{Causality, Initial, Kind, Variability, Variable, VariableTable};
 use std::collections::HashSet;
 
+/// Every violation of the standard's rules in a table of variables, at least one.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("{}", .violations.iter().map(Violation::to_string).collect::<Vec<_>>().join("; "))]
+#[non_exhaustive]
+pub struct TableError {
+    /// In the order of the table.
+    pub violations: Vec<Violation>,
+}
+
+/// A variable that violates a rule.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("{variable}: {rule}")]
+#[non_exhaustive]
+pub struct Violation {
+    /// Its name.
+    pub variable: String,
+    /// The rule.
+    pub rule: Rule,
+}
+
+/// A rule of the standard on variables, or of this table, that is violated.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
+pub enum Rule {
+    /// Names are unique.
+    #[error("the name is used twice")]
+    UniqueName,
+    /// Names are structured: `identifier`, `identifier[i]` or `identifier[i,j]`.
+    #[error("the name does not follow structured naming")]
+    StructuredName,
+    /// The elements of a role are contiguous.
+    #[error("the variables of its role are not side by side")]
+    Contiguous,
+    /// The standard allows the combination of causality, variability and initial.
+    #[error("causality, variability and initial do not go together")]
+    Combination,
+    /// Only a Real is continuous.
+    #[error("only a Real can be continuous")]
+    ContinuousReal,
+    /// Only outputs have dependencies.
+    #[error("only outputs have dependencies")]
+    DependenciesOfOutputs,
+    /// Dependencies ascend.
+    #[error("dependencies are not in ascending order")]
+    AscendingDependencies,
+    /// Outputs depend on inputs.
+    #[error("an output depends on something that is no input")]
+    DependsOnInputs,
+    /// During initialization outputs depend on inputs and parameters.
+    #[error("an initial output depends on something that is not known")]
+    DependsOnKnowns,
+    /// A nominal value is positive.
+    #[error("nominal is not a positive number")]
+    PositiveNominal,
+    /// All numbers are finite.
+    #[error("start, min and max must be finite")]
+    Finite,
+    /// `min <= max`.
+    #[error("min is greater than max")]
+    Range,
+    /// `start` lies within `[min, max]`.
+    #[error("start is not within [min, max]")]
+    StartInRange,
+    /// Integers and Booleans are exact.
+    #[error("start is not a whole number")]
+    WholeStart,
+}
+
 impl VariableTable {
-    /// Every violation of the standard's rules on variables, one sentence each.
+    /// Checks the standard's rules on variables.
     ///
-    /// Names are unique and structured; start values lie within `[min, max]`, `min <= max`;
-    /// Integers and Booleans are exact; causality, variability and initial are a combination
-    /// the standard allows; dependencies name inputs (and, during initialization, parameters)
-    /// of this table in ascending order; the elements of a role are contiguous.
-    pub fn check(&self) -> Result<(), Vec<String>> {
-        let mut problems = Vec::new();
+    /// # Errors
+    /// Every [`Rule`] that a variable violates.
+    pub fn check(&self) -> Result<(), TableError> {
+        let mut violations = Vec::new();
         let mut names = HashSet::new();
         for (reference, variable) in self.iter() {
-            let name = &variable.name;
-            let mut say = |problem: &str| problems.push(format!("{name}: {problem}"));
-            if !names.insert(name) {
-                say("the name is used twice");
+            let mut violated = |rule: Rule| {
+                violations.push(Violation {
+                    variable: variable.name.clone(),
+                    rule,
+                });
+            };
+            if !names.insert(&variable.name) {
+                violated(Rule::UniqueName);
             }
-            if !is_structured(name) {
-                say("the name does not follow structured naming");
+            if !is_structured(&variable.name) {
+                violated(Rule::StructuredName);
             }
             if !self
                 .span(variable.role)
                 .range()
                 .contains(&(reference as usize))
             {
-                say("the variables of its role are not side by side");
+                violated(Rule::Contiguous);
             }
-            range_problems(variable).into_iter().for_each(&mut say);
+            range_rules(variable).into_iter().for_each(&mut violated);
             if !is_allowed(variable.causality, variable.variability, variable.initial()) {
-                say("causality, variability and initial do not go together");
+                violated(Rule::Combination);
             }
             if variable.variability == Variability::Continuous
                 && !matches!(variable.kind, Kind::Real { .. })
             {
-                say("only a Real can be continuous");
+                violated(Rule::ContinuousReal);
             }
-            self.dependency_problems(variable)
+            self.dependency_rules(variable)
                 .into_iter()
-                .for_each(&mut say);
+                .for_each(&mut violated);
         }
-        if problems.is_empty() {
-            Ok(())
-        } else {
-            Err(problems)
+        match violations.is_empty() {
+            true => Ok(()),
+            false => Err(TableError { violations }),
         }
     }
 
-    fn dependency_problems(&self, variable: &Variable) -> Vec<&'static str> {
-        let mut problems = Vec::new();
+    fn dependency_rules(&self, variable: &Variable) -> Vec<Rule> {
+        let mut violated = Vec::new();
         let is = |reference: u32, wanted: &[Causality]| {
             self.get(reference)
                 .is_some_and(|known| wanted.contains(&known.causality))
         };
         let (running, starting) = (&variable.dependencies, &variable.initial_dependencies);
         if variable.causality != Causality::Output && !(running.is_empty() && starting.is_empty()) {
-            problems.push("only outputs have dependencies");
+            violated.push(Rule::DependenciesOfOutputs);
         }
         if !(running.is_sorted_by(|a, b| a < b) && starting.is_sorted_by(|a, b| a < b)) {
-            problems.push("dependencies are not in ascending order");
+            violated.push(Rule::AscendingDependencies);
         }
         if !running.iter().all(|&r| is(r, &[Causality::Input])) {
-            problems.push("an output depends on something that is no input");
+            violated.push(Rule::DependsOnInputs);
         }
         let knowns = [Causality::Input, Causality::Parameter];
         if !starting.iter().all(|&r| is(r, &knowns)) {
-            problems.push("an initial output depends on something that is not known");
+            violated.push(Rule::DependsOnKnowns);
         }
-        problems
+        violated
     }
 }
 
-fn range_problems(variable: &Variable) -> Vec<&'static str> {
-    let mut problems = Vec::new();
+fn range_rules(variable: &Variable) -> Vec<Rule> {
+    let mut violated = Vec::new();
     let start = variable.start;
     let (min, max) = match variable.kind {
         Kind::Real {
             nominal, min, max, ..
         } => {
             if nominal.is_some_and(|nominal| !(nominal.is_finite() && nominal > 0.0)) {
-                problems.push("nominal is not a positive number");
+                violated.push(Rule::PositiveNominal);
             }
             (min, max)
         }
@@ -89,19 +158,19 @@ fn range_problems(variable: &Variable) -> Vec<&'static str> {
         Kind::Boolean => (Some(0.0), Some(1.0)),
     };
     if !(start.is_finite() && [min, max].iter().flatten().all(|bound| bound.is_finite())) {
-        problems.push("start, min and max must be finite");
+        violated.push(Rule::Finite);
     }
     if min.zip(max).is_some_and(|(min, max)| min > max) {
-        problems.push("min is greater than max");
+        violated.push(Rule::Range);
     }
     if min.is_some_and(|min| start < min) || max.is_some_and(|max| start > max) {
-        problems.push("start is not within [min, max]");
+        violated.push(Rule::StartInRange);
     }
     let exact = start.fract() == 0.0 && start.abs() <= f64::from(i32::MAX);
     if !matches!(variable.kind, Kind::Real { .. }) && !exact {
-        problems.push("start is not a whole number");
+        violated.push(Rule::WholeStart);
     }
-    problems
+    violated
 }
 
 /// The standard's table of combinations (FMI 2.0, section 2.2.7), for the causalities in use.

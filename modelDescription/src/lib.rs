@@ -12,6 +12,28 @@
 //! ```
 //!
 //! The crate knows no C, and of a design only its sizes and names.
+//!
+//! ```
+//! use model_description::{Interface, SignalInfo, controller};
+//!
+//! let signal = |name: &str| SignalInfo { name: name.into(), ..SignalInfo::default() };
+//! let table = controller(&Interface {
+//!     sample_time: 2.0,
+//!     stop_time: 800.0,
+//!     inputs: vec![signal("pump")],
+//!     outputs: vec![signal("level")],
+//!     states: vec![signal("level")],
+//!     tracked: vec![0],
+//!     disturbances: Vec::new(),
+//!     modes: 1,
+//!     finds_the_mode: false,
+//!     thresholds: vec![0.06],
+//! });
+//! table.check()?;
+//! let command = table.vector("u"); // value references of u[1..m]
+//! assert_eq!((command.first, command.len), (4, 1));
+//! # Ok::<(), model_description::TableError>(())
+//! ```
 
 mod check;
 mod design;
@@ -23,6 +45,7 @@ mod variable;
 #[cfg(feature = "xml")]
 pub mod xml;
 
+pub use check::{Rule, TableError, Violation};
 #[cfg(feature = "write")]
 pub use design::write_design;
 pub use design::{DESIGN_FILE, DesignFileError, read_controller, read_design};

@@ -4,7 +4,7 @@
 //! is a constant, so that the same design always gives the same FMU.
 
 use crate::units::{BASE, display_factor, meaning};
-use crate::{Initial, Kind, LOG_CATEGORIES, Variability, Variable, VariableTable};
+use crate::{Initial, Kind, LOG_CATEGORIES, TableError, Variability, Variable, VariableTable};
 use quick_xml::Writer;
 use quick_xml::events::{BytesDecl, Event};
 use std::collections::BTreeMap;
@@ -59,9 +59,9 @@ pub enum XmlError {
     /// The model identifier names functions and files, but is no C identifier.
     #[error("the model identifier '{0}' is no C identifier: use letters, digits and _")]
     Identifier(String),
-    /// What is wrong with the table of variables, every problem of it.
-    #[error("{}", .0.join("; "))]
-    Table(Vec<String>),
+    /// What is wrong with the table of variables.
+    #[error(transparent)]
+    Table(#[from] TableError),
     /// The writer fails.
     #[error(transparent)]
     Write(#[from] io::Error),
@@ -98,7 +98,7 @@ fn check(document: &Document) -> Result<(), XmlError> {
     if !(first && letters.all(|c| c == '_' || c.is_ascii_alphanumeric())) {
         return Err(XmlError::Identifier(document.model_identifier.to_string()));
     }
-    document.table.check().map_err(XmlError::Table)
+    Ok(document.table.check()?)
 }
 
 fn write_document(writer: &mut Writer<Vec<u8>>, document: &Document) -> io::Result<()> {

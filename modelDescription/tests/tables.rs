@@ -201,7 +201,8 @@ fn good() -> Variable {
 fn problems(variables: impl IntoIterator<Item = Variable>) -> String {
     let mut table = VariableTable::new();
     table.extend(variables);
-    table.check().err().unwrap_or_default().join("; ")
+    let error = table.check().err();
+    error.map_or_else(String::new, |error| error.to_string())
 }
 
 #[test]

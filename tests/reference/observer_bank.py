@@ -129,7 +129,7 @@ class Candidate:
     parent: int
     convinced: bool
     kinds: tuple[frozenset[int], ...]
-    loose: bool
+    plant_changed: bool
     misfit_penalty: float = 0.0
     make: Callable[[], Hypothesis] | None = None
 
@@ -186,7 +186,7 @@ class Bank:
         self.repeats = Repeats(p, self.tuning)
         # Whose reading repeats, whose does so no more, and the leading hypothesis without the readings that repeat.
         self.repeating = self.resumed = NOBODY
-        self.aside: tuple[Hypothesis, Seen] | None = None
+        self.without_repeats: tuple[Hypothesis, Seen] | None = None
         self.unloaded, self.usual = (ModelRun(self.plants[mode], self.settings, self.tuning) for _ in range(2))
         self.apart = self.suspect = self.flagged = NOBODY
         self.misfit, self.model_valid = float(p), True
@@ -220,15 +220,15 @@ class Bank:
         for run in (self.unloaded, self.usual):
             run.read(self.plants[self.best.mode], self.best.z[self.at.wave], self.noise)
         self.seen = {id(h): self._predict(h, reading) for h in self.hypotheses}
-        head = self.hypotheses[0]
-        self.repeats.watch(head, self.seen[id(head)], reading, self.unloaded)
-        self._learn_model_error(head, reading)
-        if self._nothing_happened(head):
+        leading = self.hypotheses[0]
+        self.repeats.watch(leading, self.seen[id(leading)], reading, self.unloaded)
+        self._learn_model_error(leading, reading)
+        if self._nothing_happened(leading):
             self._go_on()
         else:
             self._compete(reading)
-        if self.aside:
-            h, seen = self.aside
+        if self.without_repeats:
+            h, seen = self.without_repeats
             h.misfit += self.tuning["misfit_share"] * (min(seen.square, 1e3) - h.misfit)
             h.update(seen)
         self.first = False
@@ -243,57 +243,57 @@ class Bank:
         self.repeating = frozenset(np.flatnonzero(again).tolist())
         self.resumed = frozenset(q for q in before - self.repeating if reading.valid[q])
         if not self.repeating:
-            self.aside = None
+            self.without_repeats = None
             return
-        head = self.hypotheses[0]
-        h = self.aside[0] if self.aside else None
-        if h is None or (h.kinds, h.loose, h.mode) != (head.kinds, head.loose, head.mode):
-            h = head.copy()
-        self.aside = (h, self._predict(h, Reading(reading.y, reading.valid & ~again, reading.noise)))
+        leading = self.hypotheses[0]
+        h = self.without_repeats[0] if self.without_repeats else None
+        if h is None or (h.kinds, h.plant_changed, h.mode) != (leading.kinds, leading.plant_changed, leading.mode):
+            h = leading.copy()
+        self.without_repeats = (h, self._predict(h, Reading(reading.y, reading.valid & ~again, reading.noise)))
 
     def before_it_froze(self, q: int) -> Hypothesis | None:
         """Returns what the leading hypothesis is without the readings that repeat, where it fits and `q` is one."""
-        fits = self.aside is not None and self.aside[0].misfit < 3.0 * self.at.p + 6.0
-        return self.aside[0] if fits and q in self.repeating else None
+        fits = self.without_repeats is not None and self.without_repeats[0].misfit < 3.0 * self.at.p + 6.0
+        return self.without_repeats[0] if fits and q in self.repeating else None
 
     def _predict(self, h: Hypothesis, reading: Reading) -> Seen:
         return h.predict(self.plants[h.mode], reading, outputs_may_err=self.outputs_may_err)
 
-    def _nothing_happened(self, head: Hypothesis) -> bool:
-        seen = self.seen[id(head)]
+    def _nothing_happened(self, leading: Hypothesis) -> bool:
+        seen = self.seen[id(leading)]
         return (
-            not head.flagged
-            and not head.loose
+            not leading.flagged
+            and not leading.plant_changed
             and seen.regular
             and seen.square < self.tuning["quiet_beside"] + self.tuning["quiet_per_output"] * self.at.p
             and bool(np.all(self.repeats.evidence < self.tuning["frozen_evidence"]))
             and not self.first
             and not self.apart
             and not (self.trusts_model and self.suspect)
-            and self._is_undisputed(head)
+            and self._is_undisputed(leading)
         )
 
-    def _is_undisputed(self, head: Hypothesis) -> bool:
+    def _is_undisputed(self, leading: Hypothesis) -> bool:
         after = {id(h): h.score + self.seen[id(h)].likelihood for h in self.hypotheses}
         return all(
-            self._stands_for(h, head, h.mode) and h.mode != head.mode and after[id(h)] <= after[id(head)]
+            self._stands_for(h, leading, h.mode) and h.mode != leading.mode and after[id(h)] <= after[id(leading)]
             for h in self.hypotheses[1:]
         )
 
     @staticmethod
     def _stands_for(h: Hypothesis, leading: Hypothesis, mode: int) -> bool:
-        return h.mode == mode and h.kinds == leading.kinds and h.loose == leading.loose and h.convinced
+        return h.mode == mode and h.kinds == leading.kinds and h.plant_changed == leading.plant_changed and h.convinced
 
     def _go_on(self) -> None:
-        head = self.hypotheses[0]
-        lead = head.score + self.seen[id(head)].likelihood
+        leading = self.hypotheses[0]
+        lead = leading.score + self.seen[id(leading)].likelihood
         for h in self.hypotheses:
             seen = self.seen[id(h)]
             h.score += seen.likelihood - lead
             h.update(seen)
             h.misfit += self.tuning["misfit_share"] * (min(seen.square, 1e3) - h.misfit)
-        head.score = 0.0
-        self.best, self.suspect, self.lead = head, NOBODY, math.inf
+        leading.score = 0.0
+        self.best, self.suspect, self.lead = leading, NOBODY, math.inf
         if self.finds_mode:
             self._weigh_modes()
 
@@ -324,13 +324,13 @@ class Bank:
         kept: list[Candidate] = []
         plain = False
         for c in candidates:
-            is_plain = not c.flagged and not c.loose and bool(c.convinced)
+            is_plain = not c.flagged and not c.plant_changed and bool(c.convinced)
             stays = c.score >= most - margin and len(kept) < self.tuning["kept"] - (not plain)
             if not stays and (plain or not is_plain):
                 continue
             mode = self.hypotheses[c.parent].mode
-            kind = (c.flagged, c.loose, c.convinced, mode)
-            alike = sum((o.flagged, o.loose, o.convinced, self.hypotheses[o.parent].mode) == kind for o in kept)
+            kind = (c.flagged, c.plant_changed, c.convinced, mode)
+            alike = sum((o.flagged, o.plant_changed, o.convinced, self.hypotheses[o.parent].mode) == kind for o in kept)
             if alike >= self.tuning["per_sensor_set"] or self._is_twin(c, kept):
                 continue
             plain = plain or is_plain
@@ -348,7 +348,7 @@ class Bank:
         h, share = self.hypotheses[candidate.parent], self.tuning["same_estimate"]
         for other in kept:
             o = self.hypotheses[other.parent]
-            same = (o.kinds, o.loose, o.convinced, o.mode) == (h.kinds, h.loose, h.convinced, h.mode)
+            same = (o.kinds, o.plant_changed, o.convinced, o.mode) == (h.kinds, h.plant_changed, h.convinced, h.mode)
             twins = not other.make and same and o.has_estimate(h.z, share)
             if twins and self.seen[id(o)].leaves(self.seen[id(h)].r, share):
                 return True
@@ -422,12 +422,12 @@ class Bank:
             ratio = self.noise_ratio[q] * (1.0 + (relative - 1.0) / self.noise_samples)
             self.noise_ratio[q] = min(max(ratio, 1.0), tuning["noise_limit"])
 
-    def _learn_model_error(self, head: Hypothesis, reading: Reading) -> None:
+    def _learn_model_error(self, leading: Hypothesis, reading: Reading) -> None:
         """Fisher scoring for the variance of the model's error, relative to the assumed one."""
-        seen, tuning, mode = self.seen[id(head)], self.tuning, head.moved_by
-        if not seen.regular or head.loose:
+        seen, tuning, mode = self.seen[id(leading)], self.tuning, leading.moved_by
+        if not seen.regular or leading.plant_changed:
             return
-        for q in sorted(set(np.flatnonzero(reading.valid)) - head.flagged):
+        for q in sorted(set(np.flatnonzero(reading.valid)) - leading.flagged):
             part = self.from_model[q] / seen.S[q, q]
             square = min(seen.r[q] ** 2 / seen.S[q, q], tuning["outlier"])
             self.model_samples[mode] = min(self.model_samples[mode] + part**2, tuning["model_memory"])
@@ -446,7 +446,7 @@ class Bank:
         corrected = np.isin(np.arange(at.p), list(best.flagged))
         self.residual = np.where(corrected, reading.y - self.expected, seen.r)
         self.misfit += self.tuning["misfit_share"] * (min(seen.square, 1e3) - self.misfit)
-        self.model_valid = self.misfit < 4.0 * at.p and not best.loose
+        self.model_valid = self.misfit < 4.0 * at.p and not best.plant_changed
         loads, gains = best.z[at.load], best.z[at.gain]
         self.load = loads[: at.m] + self.u * gains + plant.Bplus @ (plant.G[:, at.m :] @ loads[at.m :])
         self.actuator_fault = np.abs(self.load) > np.array(self.settings["input_load"])
@@ -454,7 +454,7 @@ class Bank:
         self.apart = self.unloaded.displaced(self.expected, self.tuning["returned"])
         self.unloaded.learn(self.expected)
         self.usual.learn(self.expected)
-        if not best.flagged and not best.loose:
+        if not best.flagged and not best.plant_changed:
             self.usual.learn_loads(loads, gains)
         self.suspect = self.suspect | (far - best.flagged)
 
@@ -472,7 +472,7 @@ class Bank:
         self._branch(shows_at_once=False)
         errors = [self._model_error(mode) for mode in range(len(self.plants))]
         motion = Motion(u, self.moved, errors, self.outputs_may_err)
-        for h in [*self.hypotheses, *([self.aside[0]] if self.aside else [])]:
+        for h in [*self.hypotheses, *([self.without_repeats[0]] if self.without_repeats else [])]:
             h.advance(self.plants[h.mode], self.settings, self.noise, motion)
         self._branch(shows_at_once=True)
 
@@ -480,16 +480,16 @@ class Bank:
         """Sets a hypothesis for each other mode beside the leading one: entered at this sample, or before."""
         if not self.finds_mode:
             return
-        head = self.hypotheses[0]
+        leading = self.hypotheses[0]
         for mode, plant in enumerate(self.plants):
-            if mode == head.mode or self.plants[head.mode].shows_unlike(plant) != shows_at_once:
+            if mode == leading.mode or self.plants[leading.mode].shows_unlike(plant) != shows_at_once:
                 continue
-            score = head.score + self.mode_log_rate
-            standing = [h for h in self.hypotheses[1:] if self._stands_for(h, head, mode)]
+            score = leading.score + self.mode_log_rate
+            standing = [h for h in self.hypotheses[1:] if self._stands_for(h, leading, mode)]
             old = max(standing, key=lambda h: h.score, default=None)
             if old and old.score >= score - self.tuning["switch_restart"]:
                 continue
-            child = head.copy()
+            child = leading.copy()
             child.score = score
             self._enter(child, mode)
             if old:
@@ -498,7 +498,7 @@ class Bank:
                 self.hypotheses.append(child)
 
     def _tell(self, mode: int) -> None:
-        for h in [*self.hypotheses, *([self.aside[0]] if self.aside else [])]:
+        for h in [*self.hypotheses, *([self.without_repeats[0]] if self.without_repeats else [])]:
             if self.first:
                 h.mode = h.moved_by = mode
             elif h.mode != mode:
@@ -537,7 +537,7 @@ class Proposals:
         if h is not bank.best and self._has_come_to_nothing():
             self.stay -= self.tuning["fading"]
         self.valid = frozenset(np.flatnonzero(reading.valid).tolist())
-        self.list = [Candidate("stay", self.stay, index, h.convinced, h.kinds, h.loose)]
+        self.list = [Candidate("stay", self.stay, index, h.convinced, h.kinds, h.plant_changed)]
 
     def all(self) -> list[Candidate]:
         """Returns every candidate."""
@@ -570,7 +570,9 @@ class Proposals:
         by_residual = name in ("bias", "scale") and not self.bank.trusts_model
         convinced = convinced and (not by_residual or score > self.stay)
         child = trial.child
-        candidate = Candidate(name, score, self.index, convinced, child.kinds, child.loose, misfit, lambda: child)
+        candidate = Candidate(
+            name, score, self.index, convinced, child.kinds, child.plant_changed, misfit, lambda: child
+        )
         self.list.append(candidate)
 
     # The plant.
@@ -580,15 +582,15 @@ class Proposals:
         if self.unlikely:
             for jump in self.plant.jumps(self.log_rate["load"], tuning):
                 self._add("load", jump.log_rate, self._jumped(jump), convinced=h.convinced)
-            if not h.loose:
+            if not h.plant_changed:
                 log_rate = tuning["everything"] * self.log_rate["load"]
-                self._add("loosen", log_rate, self._loosened, convinced=h.convinced)
-        if h.loose:
-            tight = Candidate(
-                "tighten", self.stay + self.log_rate["release"], self.index, h.convinced, h.kinds, loose=False
+                self._add("changed", log_rate, self._plant_changed, convinced=h.convinced)
+        if h.plant_changed:
+            restored = Candidate(
+                "restored", self.stay + self.log_rate["release"], self.index, h.convinced, h.kinds, plant_changed=False
             )
-            tight.make = self._tightened
-            self.list.append(tight)
+            restored.make = self._plant_restored
+            self.list.append(restored)
         if bank.first:
             if not h.flagged:
                 log_rate = self.log_rate["fault"]
@@ -605,9 +607,9 @@ class Proposals:
         if not h.flagged:
             self._drifted()
 
-    def _tightened(self) -> Hypothesis:
+    def _plant_restored(self) -> Hypothesis:
         child = self.h.copy()
-        child.loose = False
+        child.plant_changed = False
         return child
 
     def _jumped(self, jump: Jump) -> Callable[[Hypothesis], None]:
@@ -616,7 +618,7 @@ class Proposals:
 
         return change
 
-    def _loosened(self, child: Hypothesis) -> None:
+    def _plant_changed(self, child: Hypothesis) -> None:
         """The matrices may be wrong in any way: so may what they did to the last sample."""
         at, plant = self.at, self.plant
         error = self.bank.settings["changed_error"] ** 2
@@ -626,7 +628,7 @@ class Proposals:
         for rows in (at.x, on_states):
             for columns in (at.x, on_states):
                 child.P[rows, columns] += missed
-        child.loose = True
+        child.plant_changed = True
 
     def _started(self, child: Hypothesis) -> None:
         child.P[self.at.x, self.at.x] += np.square(self.bank.settings["start_elsewhere"])
@@ -640,7 +642,7 @@ class Proposals:
         return Seen(np.where(valid, self.reading.y - run.y, 0.0), S, run.y)
 
     def _put_back(self, name: str, run: ModelRun, drifted: frozenset[int], *, score: float, convinced: bool) -> None:
-        candidate = Candidate(name, score, self.index, convinced, (drifted, NOBODY, NOBODY), self.h.loose)
+        candidate = Candidate(name, score, self.index, convinced, (drifted, NOBODY, NOBODY), self.h.plant_changed)
         candidate.misfit_penalty = -2.0 * self.log_rate["fault"]
         candidate.make = lambda: self._at_run(run, drifted)
         self.list.append(candidate)
@@ -787,12 +789,12 @@ class Proposals:
             if (
                 other is not self.h
                 and (other.flagged, other.additive, other.convinced) == (left, left, True)
-                and (other.loose, other.mode) == (self.h.loose, self.h.mode)
+                and (other.plant_changed, other.mode) == (self.h.plant_changed, self.h.mode)
                 and other.score + seen.likelihood >= score
                 and seen.leaves(trial.seen.r, self.tuning["same_estimate"])
             ):
                 return
         child = trial.child
         self.list.append(
-            Candidate("release", score, self.index, convinced, child.kinds, child.loose, 0.0, lambda: child)
+            Candidate("release", score, self.index, convinced, child.kinds, child.plant_changed, 0.0, lambda: child)
         )

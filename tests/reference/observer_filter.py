@@ -235,7 +235,7 @@ class Hypothesis:
     stuck: frozenset[int] = NOBODY
     scaled: frozenset[int] = NOBODY
     convinced: bool = True
-    loose: bool = False
+    plant_changed: bool = False
     score: float = 0.0
 
     @property
@@ -302,7 +302,7 @@ class Hypothesis:
         self.moved_by = self.mode
         Q = np.zeros(at.size)
         # The model's error acts as a load that moves as the state and the input move.
-        error = settings["changed_error"] ** 2 if self.loose else motion.model_errors[self.mode]
+        error = settings["changed_error"] ** 2 if self.plant_changed else motion.model_errors[self.mode]
         Q[at.load[at.m + at.s :]] += error * self.unmodelled(plant, motion.moved)
         moved, self.before = (self.z[at.x] - self.before) ** 2, self.z[at.x].copy()
         Q[at.load] += plant.load_walk**2

@@ -58,7 +58,7 @@ def active_mode(schedule: list[dict], tick: int, te: float) -> int:
     )["mode"]
 
 
-def strike(event: dict, reading: float, stuck_at: float, t: float) -> float:
+def faulty_reading(event: dict, reading: float, stuck_at: float, t: float) -> float:
     """Returns what a sensor under `event` shows in place of `reading`."""
     kind = event["kind"]
     since = t - event["from"]
@@ -99,7 +99,7 @@ class Sensors:
                 if e["sensor"] == i and first_tick(e["from"], te) <= tick < first_tick(e["until"], te)
             ]
             for event in active:
-                y[i] = strike(event, y[i], self.last[i], tick * te)
+                y[i] = faulty_reading(event, y[i], self.last[i], tick * te)
             if active:
                 self.fault[i] = y[i] - healthy[i] if math.isfinite(y[i]) else 0.0
             else:

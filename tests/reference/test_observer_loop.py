@@ -381,7 +381,7 @@ def test_every_explanation_is_tried(exported: Callable[[str], tuple[dict, Path]]
         (with_events(design, FAULTS["drift"]), pushed(load=(0.2, 0.0))),
     ):
         kept |= check_against_the_fmu(changed, fmu, 620, push=push)[1]
-    every = "stay load loosen tighten start home return drift bias scale freeze change release"
+    every = "stay load changed restored start home return drift bias scale freeze change release"
     assert kept == set(every.split())
 
 

@@ -72,7 +72,7 @@ pub fn size_of_made<T>(make: impl FnOnce() -> T) -> (usize, T) {
     (REQUESTED.load(Ordering::Relaxed).wrapping_sub(before), made)
 }
 
-/// Memory set aside for a piece of work, as long as this lives.
+/// Memory reserved for a piece of work, as long as this lives.
 #[derive(Debug)]
 pub struct Reserve(NonNull<Block>);
 
@@ -110,7 +110,7 @@ struct Base(UnsafeCell<Room>);
 unsafe impl Sync for Base {}
 
 impl Reserve {
-    /// Sets `bytes` aside; `None` if the system has not that much.
+    /// Reserves `bytes`; `None` if the system has not that much.
     pub fn take(bytes: usize) -> Option<Self> {
         let size = bytes.checked_add(size_of::<Block>())?;
         let layout = Layout::from_size_align(size, ALIGN).ok()?;

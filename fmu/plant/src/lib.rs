@@ -2,7 +2,7 @@
 //!
 //! It latches its inputs when a tick begins and publishes what they lead to when the tick ends,
 //! so its outputs at a communication point are those of that very instant, whatever the step.
-//! With `scenario_enabled` it also plays the design's experiment: mode schedule, references,
+//! With `scenario_enabled` it also runs the design's experiment: mode schedule, references,
 //! faults, disturbance and noise.
 
 use fmu_abi::clock::Event;
@@ -80,8 +80,8 @@ impl PlantFmu {
     /// have not passed their check.
     fn external_mode(&self, values: &Values) -> Option<usize> {
         let spans = &self.spans;
-        let plays = values.flag(spans.scenario_enabled);
-        (!plays).then(|| nearest_mode(values, spans.external_mode, self.at_rest.len()))
+        let own = values.flag(spans.scenario_enabled);
+        (!own).then(|| nearest_mode(values, spans.external_mode, self.at_rest.len()))
     }
 
     fn external<'a>(&self, values: &'a Values) -> External<'a> {

@@ -22,7 +22,7 @@ pub enum RequestError {
     /// The disturbance that is said to be known cannot be learned.
     #[error(transparent)]
     Disturbance(#[from] DisturbanceError),
-    /// The experiment cannot be played on the plant.
+    /// The experiment cannot be run on the plant.
     #[error(transparent)]
     Scenario(#[from] ScenarioError),
     /// The true plant departs from the plant in a way that does not fit it.

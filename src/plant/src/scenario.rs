@@ -324,7 +324,7 @@ impl Scenario {
     pub const SEED: u64 = 1;
 
     /// So many samples in the first mode under a reference (r), without noise, fault and disturbance;
-    /// [`Scenario::check`] says whether it can be played on a plant.
+    /// [`Scenario::check`] says whether it can be run on a plant.
     pub fn new(steps: u64, reference: Vec<Waveform>, dims: Dimensions) -> Self {
         Self {
             steps,

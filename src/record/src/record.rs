@@ -184,7 +184,7 @@ pub enum RecordError {
     /// An output is tracked that does not exist; the number of outputs.
     #[error("the design tracks an output beyond its {0}")]
     Tracked(usize),
-    /// The scenario cannot be played on the plant.
+    /// The scenario cannot be run on the plant.
     #[error(transparent)]
     Scenario(#[from] ScenarioError),
     /// The deviation does not fit the plant.

@@ -133,14 +133,14 @@ pub struct PlantState {
     /// Reference `y_ref` (r).
     pub reference: Vec<f64>,
     /// The scenario's part of the disturbance (s) and of the faults (p), and the tick for which these and the
-    /// reference were played, if any.
+    /// reference were evaluated, if any.
     waves: Vec<f64>,
     scheduled: Vec<f64>,
-    played: Option<u64>,
+    evaluated: Option<u64>,
     /// The ticks, end excluded, over which the scenario gives the same modes, events and constant signals.
     constant: (u64, u64),
-    /// Whether one of its events strikes in these ticks.
-    struck: bool,
+    /// Whether one of its events is active in these ticks.
+    event_active: bool,
     /// Measurement noise (p).
     pub noise: Vec<f64>,
     /// The tick that the noise was drawn for, if any was.
@@ -174,7 +174,14 @@ ftc_control::state!(PlantState {
     ],
     constants: [],
     counters: [
-        tick, mode, told, played, constant, struck, drawn, next_drawn
+        tick,
+        mode,
+        told,
+        evaluated,
+        constant,
+        event_active,
+        drawn,
+        next_drawn
     ]
 });
 
@@ -247,9 +254,9 @@ impl PlantSimulator {
             reference: vec![0.0; self.scenario.reference.len()],
             waves: vec![0.0; dims.disturbances],
             scheduled: vec![0.0; dims.outputs],
-            played: None,
+            evaluated: None,
             constant: (0, 0),
-            struck: false,
+            event_active: false,
             noise: vec![0.0; dims.outputs],
             drawn: None,
             next_noise: vec![0.0; dims.outputs],
@@ -270,11 +277,11 @@ impl PlantSimulator {
         let tick = state.tick;
         let (first, end) = state.constant;
         if !(first <= tick && tick < end) || external.mode.is_some() {
-            self.play_constants(state, external);
+            self.evaluate_constant(state, external);
         }
         // A tick is observed twice: when the one before it ends, and when it begins.
-        if state.played != Some(tick) && external.mode.is_none() {
-            self.play_moving(state);
+        if state.evaluated != Some(tick) && external.mode.is_none() {
+            self.evaluate_moving(state);
         }
         let Some(mode) = self.modes.get(state.mode) else {
             return;
@@ -295,16 +302,16 @@ impl PlantSimulator {
         self.read_sensors(state, external.fault);
     }
 
-    /// What the scenario holds for some ticks: modes, constant signals, whether an event strikes. Nothing of it
+    /// What the scenario holds for some ticks: modes, constant signals, whether an event is active. Nothing of it
     /// while a mode is given in its place.
     #[cold]
-    fn play_constants(&self, state: &mut PlantState, external: &External<'_>) {
+    fn evaluate_constant(&self, state: &mut PlantState, external: &External<'_>) {
         let (tick, te) = (state.tick, self.plant.sample_time);
         let built_in = external.mode.is_none();
         state.mode = self.active_mode(external, tick);
         state.told = self.told_mode(external, state.mode, tick);
         state.departed.scenario_enabled = built_in;
-        state.played = None;
+        state.evaluated = None;
         for (values, signals) in [
             (&mut state.reference, &self.schedule.reference),
             (&mut state.waves, &self.schedule.disturbance),
@@ -315,7 +322,7 @@ impl PlantSimulator {
             }
         }
         let mut events = self.schedule.events.iter();
-        state.struck = built_in && events.any(|(lasts, _)| lasts.contains(&tick));
+        state.event_active = built_in && events.any(|(lasts, _)| lasts.contains(&tick));
         state.constant = match built_in {
             true => self.schedule.constant_around(tick),
             false => (0, 0),
@@ -323,7 +330,7 @@ impl PlantSimulator {
     }
 
     /// The scenario's signals that move, at the present tick.
-    fn play_moving(&self, state: &mut PlantState) {
+    fn evaluate_moving(&self, state: &mut PlantState) {
         let (tick, te) = (state.tick, self.plant.sample_time);
         for moving in &self.schedule.moving {
             let values = match moving.of {
@@ -335,7 +342,7 @@ impl PlantSimulator {
                 *value = moving.waveform.at(tick, te);
             }
         }
-        state.played = Some(tick);
+        state.evaluated = Some(tick);
     }
 
     /// The mode (0-based) at `tick`: the scenario's, unless another is given.
@@ -426,16 +433,16 @@ impl PlantSimulator {
             let healthy = truth + noise;
             *fault = scheduled + added;
             let mut reading = healthy + *fault;
-            let mut struck = false;
-            if state.struck {
+            let mut faulty = false;
+            if state.event_active {
                 for event in self.acting(sensor, tick, true) {
                     reading = event.reading(reading, *last, tick, te);
-                    struck = true;
+                    faulty = true;
                 }
             }
             if !reading.is_finite() {
                 *fault = 0.0;
-            } else if struck {
+            } else if faulty {
                 *fault = reading - healthy;
             } else {
                 *last = reading;
@@ -492,7 +499,7 @@ mod tests {
         ) {
             let simulator = simulator();
             let [x, y, y_true, fault, disturbance, reference, scheduled, noise, next_noise, last, next] = sizes.map(|size| vec![1.0; size]);
-            let mut state = PlantState { tick: 3, mode, x, y, y_true, fault, waves: disturbance.clone(), disturbance, reference, scheduled, played: None, constant: (0, 0), struck: false, noise, next_noise, next_drawn: None, last, next, told: mode, drawn: None, departed: Departed::default() };
+            let mut state = PlantState { tick: 3, mode, x, y, y_true, fault, waves: disturbance.clone(), disturbance, reference, scheduled, evaluated: None, constant: (0, 0), event_active: false, noise, next_noise, next_drawn: None, last, next, told: mode, drawn: None, departed: Departed::default() };
             let (u, f, w) = (vec![1.0; m], vec![1.0; p], vec![1.0; s]);
             let external = External::new(&f, &w).in_mode(given);
             simulator.advance(&mut state, &u).unwrap();

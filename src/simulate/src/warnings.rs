@@ -329,12 +329,12 @@ impl Held {
     }
 }
 
-/// What of a run lay outside the healthy database: its inputs are played once more.
+/// What of a run lay outside the healthy database: the regressor of its inputs is formed once more.
 #[derive(Debug)]
 struct OutsideDatabase<'a> {
     design: &'a DesignRecord,
     /// The inputs so far and the last command; none before the first sample.
-    played: Option<(InputHistory, Vec<f64>)>,
+    inputs: Option<(InputHistory, Vec<f64>)>,
     /// How many samples.
     samples: usize,
     /// The most by which it opened thresholds.
@@ -345,7 +345,7 @@ impl<'a> OutsideDatabase<'a> {
     fn new(design: &'a DesignRecord) -> Self {
         Self {
             design,
-            played: None,
+            inputs: None,
             samples: 0,
             widening: 1.0,
         }
@@ -357,7 +357,7 @@ impl<'a> OutsideDatabase<'a> {
         if estimator.predictors.is_empty() {
             return;
         }
-        let (history, before) = self.played.get_or_insert_with(|| {
+        let (history, before) = self.inputs.get_or_insert_with(|| {
             let start = &modes[record.mode].operating_point.u;
             let history = InputHistory::new(start, estimator.response_length);
             (history, start.clone())

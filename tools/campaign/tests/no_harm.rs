@@ -90,6 +90,7 @@ fn hardly_ever_worse_than_no_fault_tolerance() {
     let runs = tried("converter.toml", MODEL_ERROR, RUNS);
     let [sudden_there, drifts] = [false, true].map(|kind| worse(&runs, |run| run.drifts == kind));
     println!("nonlinear plant: no drift {sudden_there:.3?}, with a drift {drifts:.3?}");
+    assert_eq!(sudden.1, 303, "README names this number");
     assert!(100 * sudden.0 <= sudden.1, "{sudden:?}");
     assert!(healthy.2 <= 1.05, "{healthy:?}");
 }

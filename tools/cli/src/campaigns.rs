@@ -84,7 +84,7 @@ impl Arguments {
     pub fn begin(&self) -> Result<Vec<(Partial, u64)>, Failure> {
         check_output(&self.out)?;
         self.options().check().map_err(misfit)?;
-        rows::check(self.rows)?;
+        rows::check(self.rows, rows::BUILT)?;
         let read = |option, path: &Path, advice| {
             files::read(path).map_err(|error| refused(option, format!("{error}{advice}")))
         };

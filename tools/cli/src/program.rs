@@ -289,7 +289,7 @@ fn run(
     let asked = |solved, save| How {
         solver: arguments.solver.into(),
         threads: arguments.threads.into(),
-        played: None,
+        simulated: None,
         solved,
         save,
     };
@@ -351,7 +351,7 @@ fn run(
         } => {
             check_output(out)?;
             let how = How {
-                played: Some(*baselines),
+                simulated: Some(*baselines),
                 ..asked(solved.as_deref(), None)
             };
             let made = solve(design, &how, &progress)?;
@@ -459,7 +459,8 @@ fn export(
     };
     let exported = package::export(&made.design, &options)?;
     let mut text = exported.to_string();
-    text += &warnings::text(exported.misfit.as_slice());
+    let misfit: Vec<String> = exported.misfit.iter().map(ToString::to_string).collect();
+    text += &warnings::text(&misfit);
     Ok(text + &warnings::text(&made.warnings))
 }
 
@@ -540,8 +541,8 @@ struct How<'a> {
     solver: Solver,
     /// How many independent parts are worked on at the same time.
     threads: usize,
-    /// Whether its scenario is played sample by sample, and then whether with the baselines.
-    played: Option<bool>,
+    /// Whether its scenario is simulated, and then whether with the baselines.
+    simulated: Option<bool>,
     /// A file that holds it already.
     solved: Option<&'a Path>,
     /// Where to keep it.
@@ -595,7 +596,7 @@ fn announce(
         Some(_) => None,
     };
     let mut simulation = None;
-    if let Some(baselines) = how.played {
+    if let Some(baselines) = how.simulated {
         let (size, tracked) = (request.plant.dimensions(), request.control.tracked.len());
         let extent = Extent::new(size, tracked, request.scenario.steps, baselines);
         extent

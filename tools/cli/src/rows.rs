@@ -6,9 +6,12 @@ use campaign::Outcome;
 use campaign::rows::RowFile;
 use std::path::Path;
 
-/// Says whether this build writes the file.
-pub fn check(asked: bool) -> Result<(), Failure> {
-    if asked && cfg!(not(feature = "formats")) {
+/// Whether this build writes the file.
+pub const BUILT: bool = cfg!(feature = "formats");
+
+/// Refuses a file that is asked for in a build that does not write it.
+pub fn check(asked: bool, built: bool) -> Result<(), Failure> {
+    if asked && !built {
         let what = "--rows: this build leaves Parquet files out: build with `make build`, or with \
                     cargo's feature `formats`";
         return Err(Failure::Input(what.into()));
@@ -48,5 +51,20 @@ impl Rows {
             return file.keep();
         }
         Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::check;
+
+    #[test]
+    fn a_build_without_parquet_says_how_to_get_it() {
+        assert!(check(false, false).is_ok() && check(true, true).is_ok());
+        let refused = check(true, false).expect_err("nothing can write it");
+        assert_eq!(refused.exit_code(), crate::INPUT);
+        let sentence = refused.to_string();
+        assert!(sentence.contains("--rows: this build leaves Parquet files out"));
+        assert!(sentence.contains("build with `make build`"));
     }
 }

@@ -98,6 +98,20 @@ fn wrong_names_are_refused_with_those_that_there_are() {
     );
 }
 
+#[test]
+fn a_directory_is_not_taken_for_the_design_file() {
+    let bench = Bench::empty();
+    let log = example("logged_closed.csv");
+    std::fs::create_dir(bench.path("found")).unwrap();
+    for (out, such_as) in [(".", "./plant.toml"), ("found", "found/plant.toml")] {
+        let run = bench.run(&["identify", &log, "--out", out]);
+        assert_eq!(run.code(), 2);
+        let wanted = format!("--out {out}: this is a directory: name the design file");
+        assert!(run.stderr().contains(&wanted), "{}", run.stderr());
+        assert!(run.stderr().contains(such_as), "{}", run.stderr());
+    }
+}
+
 /// What contradicts itself or the log, and a log that holds too little, are told with option or log.
 #[test]
 fn what_does_not_fit_the_log_is_told_with_its_option_or_the_log() {

@@ -204,7 +204,7 @@ method = "none"
     assert!(!out.contains("observer decay above"), "{out}");
 }
 
-/// A table with a time column is played at its own speed.
+/// A table with a time column keeps its own times.
 #[test]
 fn a_table_is_resampled_to_the_sample_time() {
     let text = |extra: &str| {
@@ -240,8 +240,8 @@ fn a_table_is_resampled_to_the_sample_time() {
         )
         .replace('.', ",")
     });
-    let played = reference(&fine, "").unwrap();
-    assert_eq!((played[29], played[30], played[59]), (0.5, -0.25, -0.25));
+    let values = reference(&fine, "").unwrap();
+    assert_eq!((values[29], values[30], values[59]), (0.5, -0.25, -0.25));
     let coarse = "Time [min],r\n0,0\n0.5,3\n1,6\n";
     let held = reference(coarse, "").unwrap();
     assert_eq!((held[29], held[30]), (0.0, 3.0));

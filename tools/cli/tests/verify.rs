@@ -520,6 +520,11 @@ fn archives_that_are_none_of_ours() {
     }
     many.refused("many entries", 2, &["more than 64 entries"]);
 
+    let mut large = Exported::new(SOUND);
+    let zeros = vec![0; (256 << 20) + 1];
+    large.files.insert("documentation/index.html".into(), zeros);
+    large.refused("unpacked size", 2, &["larger than 256 MB"]);
+
     let mut wide = Exported::new(SOUND);
     let attributes: String = (0..60_000).map(|at| format!(" a{at}=\"\"")).collect();
     let xml = format!("<fmiModelDescription{attributes} guid=\"none\"/>");

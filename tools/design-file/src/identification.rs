@@ -58,6 +58,8 @@ type Unusable = Box<dyn std::error::Error + Send + Sync>;
 pub enum Error {
     /// No design can have this file's name.
     Name(PathBuf, ValueError),
+    /// A directory stands where the design file is to be written.
+    Directory(PathBuf),
     /// No log was named.
     NoLog,
     /// A log cannot be used.
@@ -135,6 +137,12 @@ impl Error {
                 let out = format!("{} {}", option("out"), out.display());
                 format!("{out}: the file's name {what}")
             }
+            Self::Directory(out) => format!(
+                "{} {}: this is a directory: name the design file to write in it, such as {}",
+                option("out"),
+                out.display(),
+                out.join("plant.toml").display()
+            ),
             Self::NoLog => "name at least one log".into(),
             Self::Log(log, what) => format!("{}: {what}", log.display()),
             Self::NoColumn {
@@ -270,6 +278,9 @@ pub fn identify(asked: &Asked) -> Result<Found, Error> {
 
 /// The design's name: the file's, which must be a C identifier.
 fn name_of(out: &Path) -> Result<String, Error> {
+    if out.is_dir() || out.file_name().is_none() {
+        return Err(Error::Directory(out.into()));
+    }
     let stem = out
         .file_stem()
         .and_then(|stem| stem.to_str())

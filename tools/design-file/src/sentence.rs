@@ -28,15 +28,20 @@ pub(crate) fn syntax(text: &str, error: &toml::de::Error) -> Error {
     let at = span.start;
     let place_words = position(text, at);
     let key = text.get(span).unwrap_or_default();
-    let sentence = match error.message() {
-        "duplicate key" if !key.is_empty() => {
+    let sentence = match (without_value(text, at), error.message()) {
+        (Some(key), message) if !message.starts_with("unclosed") => format!(
+            "{place_words}: {} has no value: write `{} = ` and the value, or leave the key out",
+            shorten(key),
+            shorten(key)
+        ),
+        (_, "duplicate key") if !key.is_empty() => {
             format!(
                 "{place_words}: {} stands here again: {}",
                 shorten(key),
                 shape::once(key)
             )
         }
-        message => format!(
+        (_, message) => format!(
             "{place_words}: this is not TOML ({}): correct the syntax there",
             one_line(message)
         ),
@@ -45,6 +50,22 @@ pub(crate) fn syntax(text: &str, error: &toml::de::Error) -> Error {
         line: Some(place(text, at).0),
         ..Error::of_file(sentence)
     }
+}
+
+/// The key of `key =` before byte `at`, where nothing follows on its line.
+fn without_value(text: &str, at: usize) -> Option<&str> {
+    let (before, after) = text.split_at_checked(at)?;
+    let after = after.lines().next().unwrap_or_default().trim_start();
+    let before = before.rsplit('\n').next().unwrap_or_default();
+    let inner = before
+        .contains('{')
+        .then(|| before.rsplit(['{', ',']).next());
+    let before = inner.flatten().unwrap_or(before).trim();
+    let key = before.strip_suffix('=')?.trim_end();
+    let nothing = after.is_empty() || after.starts_with(['#', ',', '}']);
+    let named = |c: char| c.is_alphanumeric() || "_-.".contains(c);
+    let is_key = key.starts_with(char::is_alphabetic) && key.chars().all(named);
+    (nothing && is_key).then_some(key)
 }
 
 /// A value that does not fit the schema as one sentence: place, key, what is wrong, what to do.
@@ -154,6 +175,21 @@ mod tests {
         assert_eq!(position("ab\ncd", 4), "line 2, column 2");
         assert_eq!(position("é=1", 3), "line 1, column 3");
         assert_eq!(position("", 10), "line 1, column 1");
+    }
+
+    #[test]
+    fn a_key_without_a_value_is_named() {
+        for (text, at, key) in [
+            ("a = 1\ngamma =\n", 13, Some("gamma")),
+            ("decay =   # none", 10, Some("decay")),
+            ("decay", 5, None),
+            ("x = { a = 1, noise =}", 20, Some("noise")),
+            ("decay = a", 8, None),
+            ("tracked = [1, 2", 15, None),
+            ("[observer", 9, None),
+        ] {
+            assert_eq!(without_value(text, at), key, "{text}");
+        }
     }
 
     #[test]

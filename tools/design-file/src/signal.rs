@@ -88,7 +88,7 @@ impl From<Between> for Interpolation {
     }
 }
 
-/// Where tables are, and how they are played.
+/// Where tables are, and how they are interpolated.
 #[derive(Clone, Copy, Debug)]
 pub struct Tables<'a> {
     /// The design file's directory.

@@ -21,7 +21,7 @@ const READY: &str = ".ftc-fmu-ready";
 const LOCK: &str = ".lock";
 
 /// Where replaced files are kept until all new ones are in place.
-const ASIDE: &str = ".replaced";
+const REPLACED: &str = ".replaced";
 
 /// Why an output directory did not get its files.
 #[derive(Debug, thiserror::Error)]
@@ -154,7 +154,7 @@ impl Staging {
         let ready = self.out.join(READY);
         let _moving = unfinished::moving();
         let prepare = || {
-            fs::create_dir(self.folder().join(ASIDE))?;
+            fs::create_dir(self.folder().join(REPLACED))?;
             flush(self.folder())?;
             fs::rename(self.folder(), &ready)?;
             flush(&self.out)
@@ -193,7 +193,7 @@ impl Staging {
 fn collected(folder: &Path) -> io::Result<Vec<OsString>> {
     let names = fs::read_dir(folder)?.map(|entry| entry.map(|entry| entry.file_name()));
     let mut names: Vec<OsString> = names.collect::<io::Result<_>>()?;
-    names.retain(|name| name != LOCK && name != ASIDE);
+    names.retain(|name| name != LOCK && name != REPLACED);
     names.sort();
     Ok(names)
 }
@@ -242,9 +242,9 @@ fn exchange(out: &Path, ready: &Path, names: &[OsString]) -> Result<(), String> 
     flush(out).map_err(|error| format!("cannot be flushed to the disk ({error})"))
 }
 
-/// Puts a file into place; what stood there remains under its name until then, and aside.
+/// Puts a file into place; what stood there remains under its name until then, and in [`REPLACED`].
 fn swap(out: &Path, ready: &Path, name: &OsStr) -> io::Result<()> {
-    let (target, old) = (out.join(name), ready.join(ASIDE).join(name));
+    let (target, old) = (out.join(name), ready.join(REPLACED).join(name));
     if fs::symlink_metadata(&target).is_ok() {
         // Not every file system has hard links.
         match fs::hard_link(&target, &old) {
@@ -261,7 +261,7 @@ fn swap_back(out: &Path, ready: &Path, name: &OsStr) {
     let (target, fresh, old) = (
         out.join(name),
         ready.join(name),
-        ready.join(ASIDE).join(name),
+        ready.join(REPLACED).join(name),
     );
     if !fresh.exists() {
         fs::rename(&target, fresh).ok();
@@ -340,14 +340,14 @@ mod tests {
             staging.add(name, b"new").unwrap();
         }
         let names = staging.names().unwrap();
-        // The old c cannot be put aside: a directory bears its name there.
-        fs::create_dir_all(staging.folder().join(ASIDE).join("c")).unwrap();
+        // The old c cannot be kept: a directory bears its name there.
+        fs::create_dir_all(staging.folder().join(REPLACED).join("c")).unwrap();
         let message = exchange(out, staging.folder(), &names).unwrap_err();
         assert!(message.starts_with("c cannot be written"), "{message}");
         assert_eq!(fs::read_to_string(out.join("a")).unwrap(), "old a");
         assert!(!out.join("b").exists());
         assert_eq!(fs::read_to_string(out.join("c")).unwrap(), "old c");
-        fs::remove_dir_all(staging.folder().join(ASIDE)).unwrap();
+        fs::remove_dir_all(staging.folder().join(REPLACED)).unwrap();
         let paths = staging.commit().unwrap();
         assert_eq!(paths.len(), 3);
         assert_eq!(fs::read_to_string(out.join("c")).unwrap(), "new");

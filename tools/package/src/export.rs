@@ -11,7 +11,7 @@ use model_description::xml::{self, Document};
 use model_description::{CONTROLLER, Interface, PLANT, VariableTable};
 use output::Staging;
 use report::Digest;
-use report::connection::{self, Side};
+use report::connection::{self, Misfit, Side};
 use report::documentation;
 use std::fmt;
 use std::fs;
@@ -109,7 +109,7 @@ pub struct Exported {
     /// How the FMUs must be stepped.
     pub coupling: &'static str,
     /// What does not fit in the package, if one was written.
-    pub misfit: Option<String>,
+    pub misfit: Option<Misfit>,
 }
 
 /// The files, how the FMUs are stepped, and the platforms.

@@ -64,7 +64,7 @@ fn harmless(path: &str, design: &Design, original: &Design) -> bool {
     let proved_again = parts.into_iter().any(begins) || is_certified_gain(path);
     // Named as not proved by `verify`, and without a part in the linear loop.
     let named = begins("/controller/estimator/");
-    // What the plant FMU plays, and what signals are called: no part of the controller. The ranges of the
+    // The experiment of the plant FMU, and what signals are called: no part of the controller. The ranges of the
     // inputs, to which it clamps, are named by `verify`; in an FMU they stand in the description, too.
     let elsewhere = begins("/scenario/") || begins("/true_plant/") || begins("/signals/");
     let same_loop = design.controller.feedback == original.controller.feedback
@@ -161,7 +161,7 @@ fn every_leaf(example: &str, original: &Design, below: &str) {
                 refused += 1;
                 continue;
             };
-            // The proofs do not read the estimator, nor what is played: they hold as before.
+            // The proofs do not read the estimator, nor the experiment: they hold as before.
             let untouched = same_claims(&design, original);
             let verdict = match untouched {
                 true => design

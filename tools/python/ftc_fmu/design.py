@@ -114,7 +114,7 @@ class Design:
     ) -> list[Path]:
         """Writes NAME_controller.fmu and NAME_plant.fmu, and with `ssp` the package of both.
 
-        The plant FMU plays the design's own scenario, not one that was given to `simulate`.
+        The plant FMU runs the design's own scenario, not one that was given to `simulate`.
 
         Args:
             out: Folder; made where there is none.

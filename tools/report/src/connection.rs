@@ -29,13 +29,21 @@ pub fn coupling(design: &Design) -> &'static str {
     }
 }
 
-/// What a package that names parallel masters must say of this design; nothing where it fits.
-pub fn misfit(design: &Design) -> Option<String> {
-    (design.controller.feedback.latency == 0).then(|| {
+/// What of a design does not fit a package that names parallel masters.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
+pub enum Misfit {
+    /// The design allows for no sample of delay in the loop.
+    #[error(
         "the masters that the package is for step both FMUs in parallel, which puts a sample of delay into the \
          loop, but the design allows for none: design it with latency = 1"
-            .into()
-    })
+    )]
+    NoLatency,
+}
+
+/// What a package that names parallel masters must say of this design; nothing where it fits.
+pub fn misfit(design: &Design) -> Option<Misfit> {
+    (design.controller.feedback.latency == 0).then_some(Misfit::NoLatency)
 }
 
 /// What a signal is, and where it goes: name, meaning, counterpart.

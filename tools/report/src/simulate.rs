@@ -49,7 +49,7 @@ const NUMBER: u64 = 20;
 pub struct Extent {
     /// Samples of each run.
     pub steps: u64,
-    /// Runs in which the scenario is played once, plants that depart from the model among them.
+    /// Runs of the scenario, those of plants that depart from the model among them.
     pub runs: u64,
     /// About how many bytes the table of all samples takes on the disk.
     pub bytes: u64,

@@ -451,3 +451,27 @@ fn tenths(value: f64) -> i64 {
 fn units(value: f64) -> String {
     format!("{}", tenths(value) as f64 / 10.0)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::{Ink, STYLE};
+
+    /// Viewers without CSS variables, and paper, show the colours of the light page.
+    #[test]
+    fn a_colour_is_the_same_with_style_and_without() {
+        for ink in [
+            Ink::Text,
+            Ink::Faint,
+            Ink::Blue,
+            Ink::Vermilion,
+            Ink::Green,
+            Ink::Purple,
+            Ink::Ochre,
+        ] {
+            let (class, colour) = ink.class_and_colour();
+            let name = class.trim_start_matches("ink-");
+            let wanted = format!("--{name}:{colour}");
+            assert_eq!(STYLE.matches(&wanted).count(), 2, "{wanted}");
+        }
+    }
+}

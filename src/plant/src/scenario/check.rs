@@ -1,4 +1,4 @@
-//! Whether a scenario can be played: the ranges of its numbers, the order of its times, one of everything.
+//! Whether a scenario can be run: the ranges of its numbers, the order of its times, one of everything.
 
 use super::{FaultEvent, FaultKind, MOST_STEPS, ModeInterval, Scenario, Waveform};
 use crate::dimensions::Dimensions;
@@ -86,7 +86,7 @@ impl fmt::Display for Quantity {
     }
 }
 
-/// Why a scenario cannot be played. Outputs, modes and entries of lists count from 1.
+/// Why a scenario cannot be run. Outputs, modes and entries of lists count from 1.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum ScenarioError {
@@ -248,7 +248,7 @@ pub(crate) fn interval(from: f64, until: f64) -> Result<(), IntervalError> {
 }
 
 impl Scenario {
-    /// Whether it can be played on a plant of these sizes with so many modes, of which so many outputs are `tracked`.
+    /// Whether it can be run on a plant of these sizes with so many modes, of which so many outputs are `tracked`.
     ///
     /// # Errors
     /// The first part that is out of its range.

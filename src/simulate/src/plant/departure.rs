@@ -49,9 +49,9 @@ impl PlantSimulator {
             .enumerate()
         {
             let faults = self.deviation.actuator_faults.iter();
-            let mut struck = false;
+            let mut faulty = false;
             for fault in faults.filter(|fault| fault.sensor == input && fault.active(tick, te)) {
-                struck = true;
+                faulty = true;
                 *value = match fault.kind {
                     FaultKind::Dropout => 0.0,
                     FaultKind::Bias { .. }
@@ -61,7 +61,7 @@ impl PlantSimulator {
                     | FaultKind::Intermittent { .. } => fault.reading(*value, *held, tick, te),
                 };
             }
-            if !struck {
+            if !faulty {
                 *held = *value;
             }
             *value += self.load(Port::Input(input), tick);

@@ -128,9 +128,9 @@ impl PlantSimulator {
             .zip(&mut trial.last);
         let clean = trial.y_true.iter().zip(change.fault);
         for (sensor, (((y, fault), last), (&healthy, &added))) in read.zip(clean).enumerate() {
-            let struck = self.acting(sensor, tick, events);
+            let active = self.acting(sensor, tick, events);
             let healthy = if late { 0.0 } else { healthy };
-            (*y, *fault) = differentiate_sensor(struck, healthy, added, last);
+            (*y, *fault) = differentiate_sensor(active, healthy, added, last);
         }
     }
 }
@@ -143,9 +143,9 @@ fn differentiate_sensor<'a>(
     last: &mut f64,
 ) -> (f64, f64) {
     let mut reading = healthy + added;
-    let (mut struck, mut lost) = (false, false);
+    let (mut faulty, mut lost) = (false, false);
     for event in events {
-        struck = true;
+        faulty = true;
         match event.kind {
             FaultKind::Bias { .. } | FaultKind::Drift { .. } | FaultKind::Intermittent { .. } => {}
             FaultKind::GainLoss { loss } => reading *= 1.0 - loss,
@@ -156,7 +156,7 @@ fn differentiate_sensor<'a>(
     if lost {
         return (0.0, 0.0);
     }
-    if !struck {
+    if !faulty {
         *last = reading;
     }
     (reading, reading - healthy)

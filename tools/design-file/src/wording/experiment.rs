@@ -53,7 +53,7 @@ pub(crate) fn of_disturbance(error: &DisturbanceError) -> Complaint {
     }
 }
 
-/// Why a scenario cannot be played.
+/// Why a scenario cannot be run.
 pub(crate) fn of_scenario(error: &ScenarioError) -> Complaint {
     match error {
         ScenarioError::Count { of, found, needed } => of_count(*of, *found, *needed),

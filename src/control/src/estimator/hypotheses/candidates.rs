@@ -14,9 +14,9 @@ pub(super) enum Action {
     /// Loads jump, and input gains with them: the number of the jump.
     Load(usize),
     /// The plant is no longer the model: its matrices may be wrong in any way.
-    Loosen,
+    PlantChanged,
     /// The plant is the model again.
-    Tighten,
+    PlantRestored,
     /// These sensors have a bias.
     Bias(Sensors),
     /// This sensor's gain is wrong.

@@ -17,7 +17,7 @@ impl Bank {
     }
 
     /// Variance of what a plant unlike the model may have done to each state in a sample (n).
-    pub(super) fn looseness<'a>(
+    pub(super) fn change_variance<'a>(
         &'a self,
         model: &'a ModeModel,
         h: &'a Hypothesis,
@@ -42,9 +42,11 @@ impl Bank {
     pub(super) fn sets(&self, h: &Hypothesis, action: Action) -> Kinds {
         let now = h.kinds();
         match action {
-            Action::Stay | Action::Load(_) | Action::Loosen | Action::Tighten | Action::Start => {
-                now
-            }
+            Action::Stay
+            | Action::Load(_)
+            | Action::PlantChanged
+            | Action::PlantRestored
+            | Action::Start => now,
             Action::Unloaded | Action::UsualLoad => Kinds {
                 additive: 0,
                 stuck: 0,
@@ -83,13 +85,13 @@ impl Bank {
     /// Which sensors a candidate takes for faulty, whether the plant is no longer the model, and the plant's mode.
     fn kind(&self, state: &BankState, candidate: &Candidate) -> (Sensors, bool, u32) {
         let parent = &state.slots[candidate.parent];
-        let loose = match candidate.action {
-            Action::Loosen => true,
-            Action::Tighten => false,
-            _ => parent.loose,
+        let plant_changed = match candidate.action {
+            Action::PlantChanged => true,
+            Action::PlantRestored => false,
+            _ => parent.plant_changed,
         };
         let flagged = self.sets(parent, candidate.action).all();
-        (flagged, loose, parent.mode)
+        (flagged, plant_changed, parent.mode)
     }
 
     /// Keeps the best candidates, few of a kind, and always one in which the plant is the model and no sensor
@@ -151,7 +153,7 @@ impl Bank {
             let o = &state.slots[other.parent];
             other.action == Action::Stay
                 && o.kinds() == h.kinds()
-                && (o.loose, o.convinced, o.mode) == (h.loose, h.convinced, h.mode)
+                && (o.plant_changed, o.convinced, o.mode) == (h.plant_changed, h.convinced, h.mode)
                 && o.has_estimate(&self.tuning, &h.z)
                 && state.seen[other.parent].leaves(&self.tuning, &seen.r)
         })
@@ -192,8 +194,8 @@ impl Bank {
         h.update(self.layout, &mut state.seen[slot], self.output_error());
         h.score = candidate.score;
         let penalty = match candidate.action {
-            Action::Stay | Action::Tighten | Action::Release(_) => 0.0,
-            Action::Load(_) | Action::Loosen => 0.0,
+            Action::Stay | Action::PlantRestored | Action::Release(_) => 0.0,
+            Action::Load(_) | Action::PlantChanged => 0.0,
             Action::Bias(_)
             | Action::Scale(_)
             | Action::Freeze(_)

@@ -71,10 +71,10 @@ impl Bank {
                     child.open(fault + q, 0.0, variance);
                 }
             }
-            Action::Loosen => {
-                child.loose = true;
+            Action::PlantChanged => {
+                child.plant_changed = true;
                 let load = layout.load() + layout.state_load();
-                for (i, v) in self.looseness(model, parent, &state.u).enumerate() {
+                for (i, v) in self.change_variance(model, parent, &state.u).enumerate() {
                     for (row, column) in
                         [(i, i), (i, load + i), (load + i, i), (load + i, load + i)]
                     {
@@ -82,7 +82,7 @@ impl Bank {
                     }
                 }
             }
-            Action::Tighten => child.loose = false,
+            Action::PlantRestored => child.plant_changed = false,
             Action::Stay => {}
         }
     }

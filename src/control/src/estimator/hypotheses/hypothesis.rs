@@ -40,7 +40,7 @@ pub struct Hypothesis {
     /// Whether nothing but a fault of its sensors could explain the readings that began it.
     pub convinced: bool,
     /// Whether the plant is no longer the model.
-    pub loose: bool,
+    pub plant_changed: bool,
     /// The plant's mode (0-based).
     pub mode: u32,
     /// The mode that brought it from the last sample to this one (0-based).
@@ -87,7 +87,15 @@ crate::state!(Hypothesis {
     parts: [z, cov, before],
     constants: [],
     counters: [
-        additive, stuck, scaled, convinced, loose, mode, moved_by, score, misfit
+        additive,
+        stuck,
+        scaled,
+        convinced,
+        plant_changed,
+        mode,
+        moved_by,
+        score,
+        misfit
     ]
 });
 crate::state!(Innovation {
@@ -293,7 +301,7 @@ impl Hypothesis {
             stuck: 0,
             scaled: 0,
             convinced: true,
-            loose: false,
+            plant_changed: false,
             mode: 0,
             moved_by: 0,
             score: 0.0,
@@ -315,7 +323,7 @@ impl Hypothesis {
         self.stuck = other.stuck;
         self.scaled = other.scaled;
         self.convinced = other.convinced;
-        self.loose = other.loose;
+        self.plant_changed = other.plant_changed;
         self.mode = other.mode;
         self.moved_by = other.moved_by;
         self.score = other.score;
@@ -424,7 +432,7 @@ impl Hypothesis {
             ..
         } = *step;
         let (stride, load, gain) = (layout.stride(), layout.load(), layout.gain());
-        let error = if self.loose {
+        let error = if self.plant_changed {
             settings.changed_error * settings.changed_error
         } else {
             step.model_error

@@ -11,7 +11,6 @@
 //! given odds. What grows slowly can be a load or a sensor's drift: `suspect` names the sensors, and
 //! the policy decides. Where no hypothesis fits, the readings are used as they are and `model_valid` is false.
 
-mod aside;
 mod candidates;
 mod competition;
 mod effect;
@@ -24,6 +23,7 @@ mod modes;
 mod propose;
 mod start;
 mod trial;
+mod without_repeats;
 
 use crate::tuning::{BankTuning, MOST_KEPT};
 use alloc::vec::Vec;
@@ -278,7 +278,7 @@ impl Bank {
             self.tell(state, mode);
         }
         let bias = self.output_error();
-        self.set_aside(state, reading);
+        self.predict_without_repeats(state, reading);
         let z = &state.slots[state.best].z;
         let model = self.model(state, state.best);
         for run in [&mut state.unloaded, &mut state.usual] {
@@ -290,17 +290,17 @@ impl Bank {
             let seen = &mut state.seen[slot];
             seen.predict(layout, model, reading, h, bias);
         }
-        let head = state.in_use.first();
-        self.watch(state, head, reading);
+        let leading_slot = state.in_use.first();
+        self.watch(state, leading_slot, reading);
         for slot in state.in_use.slots() {
             state.seen[slot].whiten(p);
         }
-        self.learn_model_error(state, head, reading);
-        let h = &state.slots[head];
+        self.learn_model_error(state, leading_slot, reading);
+        let h = &state.slots[leading_slot];
         let nothing_happened = h.flagged() == 0
-            && !h.loose
-            && state.seen[head].square < tuning.quiet(p)
-            && state.seen[head].regular
+            && !h.plant_changed
+            && state.seen[leading_slot].square < tuning.quiet(p)
+            && state.seen[leading_slot].regular
             && state.evidence.iter().all(|&e| e < tuning.frozen_evidence)
             && !state.first
             && state.apart == 0
@@ -311,7 +311,7 @@ impl Bank {
         } else {
             self.compete(state, reading);
         }
-        self.learn_aside(state);
+        self.update_without_repeats(state);
         state.first = false;
         state.mode = state.slots[state.best].mode as usize;
         self.correct_model_runs(state, reading);
@@ -322,7 +322,7 @@ impl Bank {
         state.unloaded.learn(tuning, &state.expected);
         state.usual.learn(tuning, &state.expected);
         let best = &state.slots[state.best];
-        if best.flagged() == 0 && !best.loose {
+        if best.flagged() == 0 && !best.plant_changed {
             state.usual.learn_loads(tuning, layout, &best.z);
         }
         state.suspect |= displaced & !state.slots[state.best].flagged();
@@ -355,12 +355,12 @@ impl Bank {
         }
     }
 
-    /// How wrong the model of the mode that moved the plant is, from the innovations of the hypothesis in slot `head`,
+    /// How wrong the model of the mode that moved the plant is, from the innovations of the hypothesis in `slot`,
     /// whatever they are taken for: a step of Fisher scoring for the share of the assumed variance.
-    fn learn_model_error(&self, state: &mut BankState, head: usize, reading: Reading<'_>) {
+    fn learn_model_error(&self, state: &mut BankState, slot: usize, reading: Reading<'_>) {
         let (p, tuning) = (self.layout.p, &self.tuning);
-        let (seen, h) = (&state.seen[head], &state.slots[head]);
-        if !seen.regular || h.loose {
+        let (seen, h) = (&state.seen[slot], &state.slots[slot]);
+        if !seen.regular || h.plant_changed {
             return;
         }
         let mode = h.moved_by as usize;
@@ -404,9 +404,9 @@ impl Bank {
     }
 
     /// Which sensors repeat one value while the model moves.
-    fn watch(&self, state: &mut BankState, head: usize, reading: Reading<'_>) {
+    fn watch(&self, state: &mut BankState, slot: usize, reading: Reading<'_>) {
         let (p, tuning) = (self.layout.p, &self.tuning);
-        let (h, seen) = (&state.slots[head], &state.seen[head]);
+        let (h, seen) = (&state.slots[slot], &state.seen[slot]);
         state.evidence_before.copy_from_slice(&state.evidence);
         for q in 0..p {
             let y = reading.y[q];
@@ -488,7 +488,8 @@ impl Bank {
         }
         let square = state.seen[state.best].square;
         state.misfit = self.tuning.averaged(state.misfit, square, 0.0);
-        state.model_valid = state.misfit < self.tuning.misfit_invalid * p as f64 && !h.loose;
+        state.model_valid =
+            state.misfit < self.tuning.misfit_invalid * p as f64 && !h.plant_changed;
         self.find_load(state, model);
         state.actuator_fault = 0;
         for (j, (load, size)) in state.load.iter().zip(&self.settings.input_load).enumerate() {
@@ -572,7 +573,11 @@ impl Bank {
             u,
             moved: &state.moved,
         };
-        for slot in state.in_use.slots().chain(self.in_use_aside(state)) {
+        for slot in state
+            .in_use
+            .slots()
+            .chain(self.in_use_without_repeats(state))
+        {
             let mode = state.slots[slot].mode;
             step.model = &self.modes[mode as usize];
             step.model_error = self.model_error(&state.model_share, mode);

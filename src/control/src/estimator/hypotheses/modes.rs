@@ -39,7 +39,11 @@ impl Bank {
 
     /// The plant is in `mode`, whatever else holds.
     pub(super) fn tell(&self, state: &mut BankState, mode: usize) {
-        for slot in state.in_use.slots().chain(self.in_use_aside(state)) {
+        for slot in state
+            .in_use
+            .slots()
+            .chain(self.in_use_without_repeats(state))
+        {
             let h = &mut state.slots[slot];
             match state.first {
                 true => (h.mode, h.moved_by) = (mode as u32, mode as u32),
@@ -90,31 +94,31 @@ impl Bank {
         }
         let p = self.layout.p;
         let after = |slot: usize| state.slots[slot].score + state.seen[slot].likelihood(p);
-        let head = state.in_use.first();
-        let lead = after(head);
+        let leading_slot = state.in_use.first();
+        let lead = after(leading_slot);
         let mut rivals = state.in_use.slots().skip(1);
         rivals.all(|slot| {
-            let (h, leading) = (&state.slots[slot], &state.slots[head]);
+            let (h, leading) = (&state.slots[slot], &state.slots[leading_slot]);
             stands_for(h, leading, h.mode) && h.mode != leading.mode && after(slot) <= lead
         })
     }
 
     /// Nothing happened: every hypothesis in competition stays what it is.
     pub(super) fn continue_all(&self, state: &mut BankState) {
-        let (p, head) = (self.layout.p, state.in_use.first());
+        let (p, leading_slot) = (self.layout.p, state.in_use.first());
         let likelihood = |seen: &Innovation| match state.in_use.count {
             1 => 0.0,
             _ => seen.likelihood(p),
         };
-        let lead = state.slots[head].score + likelihood(&state.seen[head]);
+        let lead = state.slots[leading_slot].score + likelihood(&state.seen[leading_slot]);
         for slot in state.in_use.slots() {
             let (h, seen) = (&mut state.slots[slot], &mut state.seen[slot]);
             h.score += likelihood(seen) - lead;
             h.update(self.layout, seen, self.output_error());
             h.misfit = self.tuning.averaged(h.misfit, seen.square, 0.0);
         }
-        state.slots[head].score = 0.0;
-        state.best = head;
+        state.slots[leading_slot].score = 0.0;
+        state.best = leading_slot;
         state.suspect = 0;
         if self.others() > 0 {
             self.weigh_modes(state);
@@ -127,13 +131,13 @@ impl Bank {
         let Some(log_rate) = self.log_rates.mode else {
             return;
         };
-        let head = state.in_use.first();
-        let (count, leading) = (self.modes.len(), state.slots[head].mode as usize);
+        let leading_slot = state.in_use.first();
+        let (count, leading) = (self.modes.len(), state.slots[leading_slot].mode as usize);
         for mode in (0..count).filter(|&mode| mode != leading) {
             if self.at_once[leading * count + mode] != moved {
                 continue;
             }
-            let lead = &state.slots[head];
+            let lead = &state.slots[leading_slot];
             let score = lead.score + log_rate;
             let standing = state.in_use.slots().skip(1);
             let standing = standing
@@ -149,7 +153,7 @@ impl Bank {
                     None => return,
                 },
             };
-            let (parent, child) = super::effect::pair(&mut state.slots, head, slot);
+            let (parent, child) = super::effect::pair(&mut state.slots, leading_slot, slot);
             child.take(parent);
             child.score = score;
             self.enter(child, mode, &state.u, &state.model_share);
@@ -201,7 +205,10 @@ impl Bank {
 
 /// Whether `h` differs from `leading` by nothing but the mode, which is `mode`.
 fn stands_for(h: &Hypothesis, leading: &Hypothesis, mode: u32) -> bool {
-    h.mode == mode && h.kinds() == leading.kinds() && h.loose == leading.loose && h.convinced
+    h.mode == mode
+        && h.kinds() == leading.kinds()
+        && h.plant_changed == leading.plant_changed
+        && h.convinced
 }
 
 /// A slot of so many that is not in use.

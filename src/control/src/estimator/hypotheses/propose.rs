@@ -16,7 +16,7 @@ struct Parent {
     stay: f64,
     flagged: Sensors,
     stuck: Sensors,
-    loose: bool,
+    plant_changed: bool,
     convinced: bool,
     /// Whether the sample is unlikely enough for something to have happened.
     unlikely: bool,
@@ -51,7 +51,7 @@ impl Bank {
             stay: h.score + seen.likelihood(p),
             flagged: h.flagged(),
             stuck: h.stuck,
-            loose: h.loose,
+            plant_changed: h.plant_changed,
             convinced: h.convinced,
             unlikely: seen.square > self.tuning.unlikely(p),
         };
@@ -99,7 +99,8 @@ impl Bank {
                 && h.flagged() == flagged
                 && h.additive == flagged
                 && h.convinced
-                && (h.loose, h.mode) == (parent.loose, state.slots[parent.slot].mode)
+                && (h.plant_changed, h.mode)
+                    == (parent.plant_changed, state.slots[parent.slot].mode)
                 && h.score + seen.likelihood(p) >= score
                 && seen.leaves(&self.tuning, r)
         })
@@ -141,14 +142,14 @@ impl Bank {
             for jump in 0..model.jumps.len() {
                 consider(state, Action::Load(jump), model.jumps[jump].log_rate);
             }
-            if !parent.loose {
-                consider(state, Action::Loosen, log_rates.changed);
+            if !parent.plant_changed {
+                consider(state, Action::PlantChanged, log_rates.changed);
             }
         }
-        if parent.loose {
+        if parent.plant_changed {
             let score = parent.stay + log_rates.release;
-            let tight = parent.then(Action::Tighten, score, parent.convinced);
-            state.candidates.add(tight);
+            let restored = parent.then(Action::PlantRestored, score, parent.convinced);
+            state.candidates.add(restored);
         }
         if state.first {
             if parent.flagged == 0 {

@@ -266,7 +266,7 @@ impl Bank {
             .collect();
         let mut in_use = SlotsInUse::NONE;
         (0..slots.len()).for_each(|slot| in_use.add(slot));
-        slots.resize(self.aside() + 1, Hypothesis::new(layout));
+        slots.resize(self.slot_without_repeats() + 1, Hypothesis::new(layout));
         BankState {
             seen: vec![Innovation::new(layout); slots.len()],
             candidates: Candidates::new(slots.len(), p, model.jumps.len()),

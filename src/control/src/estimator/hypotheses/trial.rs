@@ -145,14 +145,14 @@ impl Bank {
                     .map(|(k, size)| model.c[q * n + k] * model.c[j * n + k] * size * size)
                     .sum()
             }),
-            Action::Loosen => {
-                for (i, variance) in self.looseness(model, h, u).enumerate() {
+            Action::PlantChanged => {
+                for (i, variance) in self.change_variance(model, h, u).enumerate() {
                     add_pairs(s, p, reading.valid, |q, j| {
                         scale(q, j) * (variance * model.c[q * n + i] * model.c[j * n + i])
                     });
                 }
             }
-            Action::Stay | Action::Tighten => {}
+            Action::Stay | Action::PlantRestored => {}
         }
     }
 }

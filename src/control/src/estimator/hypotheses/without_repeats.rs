@@ -7,18 +7,18 @@ use super::{Bank, BankState};
 
 impl Bank {
     /// Its slot, behind those of the competition.
-    pub(super) fn aside(&self) -> usize {
+    pub(super) fn slot_without_repeats(&self) -> usize {
         2 * self.tuning.kept as usize + self.others()
     }
 
     /// The same, while a reading repeats.
-    pub(super) fn in_use_aside(&self, state: &BankState) -> Option<usize> {
-        (state.repeating != 0).then(|| self.aside())
+    pub(super) fn in_use_without_repeats(&self, state: &BankState) -> Option<usize> {
+        (state.repeating != 0).then(|| self.slot_without_repeats())
     }
 
     /// Which readings repeat; from the first of them on, the leading hypothesis goes on without them beside the others.
-    pub(super) fn set_aside(&self, state: &mut BankState, reading: Reading<'_>) {
-        let (head, aside) = (state.in_use.first(), self.aside());
+    pub(super) fn predict_without_repeats(&self, state: &mut BankState, reading: Reading<'_>) {
+        let (leading_slot, own_slot) = (state.in_use.first(), self.slot_without_repeats());
         let before = core::mem::take(&mut state.repeating);
         for (q, (y, last)) in reading.y.iter().zip(&state.repeated).enumerate() {
             let again = has(reading.valid, q) && y == last && !state.first;
@@ -28,32 +28,33 @@ impl Bank {
         if state.repeating == 0 {
             return;
         }
-        if before == 0 || !self.stands_aside(state) {
-            let (parent, child) = pair(&mut state.slots, head, aside);
+        if before == 0 || !self.agrees_without_repeats(state) {
+            let (parent, child) = pair(&mut state.slots, leading_slot, own_slot);
             child.take(parent);
         }
         let others = Reading {
             valid: reading.valid & !state.repeating,
             ..reading
         };
-        let (model, h) = (self.model(state, aside), &state.slots[aside]);
-        let seen = &mut state.seen[aside];
+        let (model, h) = (self.model(state, own_slot), &state.slots[own_slot]);
+        let seen = &mut state.seen[own_slot];
         seen.predict(self.layout, model, others, h, self.output_error());
         seen.whiten(self.layout.p);
     }
 
     /// Whether it says of sensors and plant what the leading hypothesis says.
-    fn stands_aside(&self, state: &BankState) -> bool {
-        let (h, head) = (
-            &state.slots[self.aside()],
+    fn agrees_without_repeats(&self, state: &BankState) -> bool {
+        let (h, leading) = (
+            &state.slots[self.slot_without_repeats()],
             &state.slots[state.in_use.first()],
         );
-        h.kinds() == head.kinds() && (h.loose, h.mode) == (head.loose, head.mode)
+        h.kinds() == leading.kinds()
+            && (h.plant_changed, h.mode) == (leading.plant_changed, leading.mode)
     }
 
     /// It takes in the readings that do not repeat.
-    pub(super) fn learn_aside(&self, state: &mut BankState) {
-        if let Some(slot) = self.in_use_aside(state) {
+    pub(super) fn update_without_repeats(&self, state: &mut BankState) {
+        if let Some(slot) = self.in_use_without_repeats(state) {
             let (h, seen) = (&mut state.slots[slot], &mut state.seen[slot]);
             h.misfit = self.tuning.averaged(h.misfit, seen.square, 0.0);
             h.update(self.layout, seen, self.output_error());
@@ -64,7 +65,7 @@ impl Bank {
     pub(super) fn before_it_froze(&self, state: &BankState, q: usize) -> Option<usize> {
         let fits =
             |slot: &usize| state.slots[*slot].misfit < self.tuning.misfit_of_fault(self.layout.p);
-        self.in_use_aside(state)
+        self.in_use_without_repeats(state)
             .filter(|slot| has(state.repeating, q) && fits(slot))
     }
 }
