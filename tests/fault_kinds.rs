@@ -7,7 +7,7 @@ mod common;
 
 use common::{Channel, KINDS, controller, plant, reference, scenario};
 use ftc_control::Controller;
-use ftc_plant::scenario::{FaultEvent, FaultKind, Waveform};
+use ftc_plant::scenario::{FaultEvent, FaultKind, FaultName, Waveform};
 use ftc_simulate::{PlantSimulator, Trajectory, Variant, run};
 use nalgebra::DVector;
 
@@ -180,5 +180,16 @@ fn different_faults_overlap() {
             println!("{first} under {second}: off by {off:.3}");
             assert!(off < undetected, "{first} under {second}: off by {off:.3}");
         }
+    }
+}
+
+/// In a record a fault has the letters of its name, and every name is one of the kinds tested here.
+#[test]
+fn a_kind_is_written_by_its_name() {
+    for name in FaultName::ALL {
+        let of_this_name = |(_, kind): &&(&str, FaultKind)| kind.name() == name;
+        let (_, kind) = KINDS.iter().find(of_this_name).unwrap();
+        let written = serde_json::to_value(kind).unwrap();
+        assert_eq!(written["kind"], name.letters());
     }
 }

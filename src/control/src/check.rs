@@ -3,13 +3,14 @@
 use crate::error::ControllerError;
 use crate::estimator::hypotheses::{MOST_MODES, Sensors};
 use crate::kernel;
+use crate::kernel::LARGEST;
 use crate::matrix::Matrix;
 use crate::parameters::{
-    ControllerParameters, Estimator, EstimatorMethod, Harmonics, Hypotheses, Limits,
-    MOST_HARMONICS, Observer, Predictor, StateFeedback,
+    ControllerParameters, Estimator, EstimatorMethod, Harmonics, Hypotheses, LONGEST_LATENCY,
+    Limits, MOST_HARMONICS, Observer, Predictor, StateFeedback,
 };
 use alloc::format;
-use alloc::string::String;
+use alloc::string::{String, ToString};
 
 type Checked = Result<(), ControllerError>;
 
@@ -59,12 +60,12 @@ fn shape(field: String, matrix: &Matrix, needed: (usize, usize)) -> Checked {
     finite(field, matrix.as_slice())
 }
 
-fn range(holds: bool, field: impl Into<String>, rule: &'static str) -> Checked {
+fn range(holds: bool, field: impl Into<String>, rule: impl ToString) -> Checked {
     match holds {
         true => Ok(()),
         false => Err(ControllerError::Range {
             field: field.into(),
-            rule,
+            rule: rule.to_string(),
         }),
     }
 }
@@ -105,7 +106,7 @@ fn modes(parameters: &ControllerParameters) -> Result<Sizes, ControllerError> {
     let Some(first) = parameters.modes.first() else {
         return Err(ControllerError::Range {
             field: "modes".into(),
-            rule: "must hold at least one mode",
+            rule: "must hold at least one mode".into(),
         });
     };
     let (n, m, p) = (first.a.nrows(), first.b.ncols(), first.c.nrows());
@@ -144,9 +145,9 @@ fn feedback(feedback: &StateFeedback, sizes: Sizes) -> Checked {
         "must name outputs of the plant",
     )?;
     range(
-        feedback.latency <= 1,
+        feedback.latency <= LONGEST_LATENCY,
         "feedback.latency",
-        "must be 0 or 1 samples",
+        format_args!("must be 0 to {LONGEST_LATENCY} samples"),
     )?;
     finite("feedback.resonators", &feedback.resonators)?;
     length("feedback.modes", feedback.modes.len(), sizes.modes)?;
@@ -223,39 +224,33 @@ impl Estimator {
         let window = self.window.saturating_mul(inputs);
         let learned = self.harmonics.as_ref().map_or(0, |known| known.count);
         let estimated = self.hypotheses.as_ref().map_or(0, Hypotheses::harmonics);
-        for (field, found, most, rule) in [
+        for (field, found, most, of) in [
             (
                 "estimator.response_length",
                 self.response_length,
                 LONGEST,
-                "must be at most 100000 samples",
+                " samples",
             ),
-            (
-                "estimator.window",
-                self.window,
-                LONGEST,
-                "must be at most 100000 samples",
-            ),
+            ("estimator.window", self.window, LONGEST, " samples"),
             (
                 "estimator.window",
                 window.saturating_mul(self.response_length),
                 LARGEST_WINDOW,
-                "must be smaller: its length times inputs times response length at most 1e7",
+                " numbers: its length times inputs times response length",
             ),
-            (
-                "estimator.harmonics.count",
-                learned,
-                MOST_HARMONICS,
-                "must be at most 50",
-            ),
+            ("estimator.harmonics.count", learned, MOST_HARMONICS, ""),
             (
                 "estimator.hypotheses.period.harmonics",
                 estimated,
                 MOST_HARMONICS,
-                "must be at most 50",
+                "",
             ),
         ] {
-            range(found <= most, field, rule)?;
+            range(
+                found <= most,
+                field,
+                format_args!("must be at most {most}{of}"),
+            )?;
         }
         Ok(())
     }
@@ -313,6 +308,10 @@ fn estimator(estimator: &Estimator, sizes: Sizes) -> Checked {
 const LARGEST_SIZE: f64 = 1e50;
 const LARGEST_SHARE: f64 = 1e6;
 
+/// Ends of the range of rates per sample: their logarithms are finite.
+const SMALLEST_RATE: f64 = 1.0 / LARGEST;
+const LARGEST_RATE: f64 = 0.999;
+
 fn hypotheses(settings: &Hypotheses, sizes: Sizes) -> Checked {
     let (n, m, p) = (sizes.states, sizes.inputs, sizes.outputs);
     let s = sizes.disturbances;
@@ -327,7 +326,9 @@ fn hypotheses(settings: &Hypotheses, sizes: Sizes) -> Checked {
     range(
         waves.saturating_add(2 * n + m + p) <= LARGEST_JOINT_STATE,
         "estimator.hypotheses",
-        "must estimate at most 1000 states together: twice the plant's, inputs, outputs and waves",
+        format_args!(
+            "must estimate at most {LARGEST_JOINT_STATE} states together: twice the plant's, inputs, outputs and waves"
+        ),
     )?;
     for (what, values, needed) in [
         ("noise", &settings.noise, p),
@@ -347,18 +348,22 @@ fn hypotheses(settings: &Hypotheses, sizes: Sizes) -> Checked {
         let sensible = values
             .iter()
             .all(|value| (0.0..=LARGEST_SIZE).contains(value));
-        range(sensible, field, "must hold numbers from 0 to 1e50")?;
+        range(
+            sensible,
+            field,
+            format_args!("must hold numbers from 0 to {LARGEST_SIZE:e}"),
+        )?;
     }
     range(
         p <= Sensors::BITS as usize,
         "estimator.method",
-        "observes at most 64 outputs",
+        format_args!("observes at most {} outputs", Sensors::BITS),
     )?;
     fitted_modes(settings, sizes)?;
     range(
         settings.mode_rate.is_none() || sizes.modes <= MOST_MODES,
         "estimator.hypotheses.mode_rate",
-        "finds the mode of at most 9 modes",
+        format_args!("finds the mode of at most {MOST_MODES} modes"),
     )?;
     rates_and_shares(settings)
 }
@@ -394,11 +399,11 @@ fn rates_and_shares(settings: &Hypotheses) -> Checked {
         settings.change_rate,
         settings.load_rate,
     ];
-    let sensible = rates.iter().all(|rate| (1e-100..=0.999).contains(rate));
+    let sensible = |rate: &f64| (SMALLEST_RATE..=LARGEST_RATE).contains(rate);
     range(
-        sensible,
+        rates.iter().all(sensible),
         "estimator.hypotheses",
-        "must have rates from 1e-100 to 0.999",
+        format_args!("must have rates from {SMALLEST_RATE:e} to {LARGEST_RATE}"),
     )?;
     let shares = [
         settings.changed_error,
@@ -417,7 +422,7 @@ fn rates_and_shares(settings: &Hypotheses) -> Checked {
     range(
         sensible,
         "estimator.hypotheses",
-        "must have shares from 0 to 1e6",
+        format_args!("must have shares from 0 to {LARGEST_SHARE:e}"),
     )
 }
 

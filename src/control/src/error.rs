@@ -48,7 +48,7 @@ pub enum ControllerError {
         /// Path of the field.
         field: String,
         /// What it must be: the end of a sentence that begins with the field.
-        rule: &'static str,
+        rule: String,
     },
 }
 

@@ -1,7 +1,7 @@
 //! Everything the controller needs to know before its first tick: plain, serialisable data.
 
 use crate::matrix::{Matrix, upper_triangle};
-use crate::tuning::Tuning;
+use crate::tuning::{LEVERAGE_LIMIT, Tuning};
 use alloc::string::String;
 use alloc::vec;
 use alloc::vec::Vec;
@@ -335,11 +335,11 @@ pub struct Estimator {
     pub tuning: Tuning,
 }
 
-/// Leverage beyond which a residual is not used, where nothing else is asked for.
-pub const LEVERAGE_LIMIT: f64 = 100.0;
-
 /// Most harmonics of a known disturbance.
 pub const MOST_HARMONICS: usize = 50;
+
+/// The longest latency in samples.
+pub const LONGEST_LATENCY: usize = 1;
 
 impl Estimator {
     /// No estimation, for so many sensors. Before choosing a method, set what it needs: its predictors or

@@ -2,7 +2,7 @@
 //! the plant or from what the user tells. They stand in the design's record
 //! ([`Estimator::tuning`](crate::parameters::Estimator::tuning)); `default()` holds the values that are designed with.
 //!
-//! Thresholds, debounce, leverage limit, rates, sizes and initial variances are chosen per design: see
+//! Thresholds, debounce, rates, sizes and initial variances are chosen per design: see
 //! [`Estimator`](crate::parameters::Estimator) and [`Hypotheses`](crate::parameters::Hypotheses). Bounds that only keep
 //! numbers finite stand where they are used.
 
@@ -13,6 +13,13 @@ use serde::{Deserialize, Serialize};
 
 /// Most hypotheses of the state-based estimator that may be kept after a sample; its memory is sized by it.
 pub const MOST_KEPT: usize = 12;
+
+/// Initial variance over that of the noise (1) of a response of which nothing is known: a few samples outweigh it.
+pub const UNKNOWN_VARIANCE: f64 = 1e6;
+
+/// Leverage (1) beyond which a residual is not used: the input then lies so far outside what the database spans that
+/// the prediction's deviation is ten times that of the noise.
+pub const LEVERAGE_LIMIT: f64 = 100.0;
 
 /// All tuning constants of a controller.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -62,7 +69,7 @@ tuning! {
         /// of what would be flagged.
         recovery_share: 0.5, [0.0, 1.0];
         /// Initial variance of that fit over that of the noise (1): nothing is known.
-        recovery_variance: 1e6, [0.0, 1e12];
+        recovery_variance: UNKNOWN_VARIANCE, [0.0, 1e12];
         /// Thresholds (1) by which a corrected reading and the model in open loop may differ: the model knows
         /// neither the disturbance nor its own error.
         open_loop_thresholds: 4.0, [0.0, 1e12];
@@ -73,7 +80,7 @@ tuning! {
     /// Tuning constants of the bank of Kalman filters.
     pub struct BankTuning {
         /// Hypotheses kept after a sample, at most: with 6 or 8 random runs had more harm.
-        kept: 12.0, [1.0, MOST_KEPT as f64];
+        kept: MOST_KEPT as f64, [1.0, MOST_KEPT as f64];
         /// Hypotheses about the same set of faulty sensors, at most: the likeliest, and one that began at another time.
         per_sensor_set: 2.0, [1.0, MOST_KEPT as f64];
         /// Log likelihood (nat) by which the best hypothesis without a fault may fall behind: it stays, and can

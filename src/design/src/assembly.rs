@@ -11,11 +11,16 @@ use super::{
     ObserverSpec, RequestError, Run, Signal, Signals, check_controllable, synthesise_with,
 };
 use crate::coverage;
+use crate::defaults::{
+    COMMISSIONING_SEED, LEAST_MEMORY, MEMORY_PERIODS, OPENING_FACTOR, SMALLEST_THRESHOLD,
+    WINDOW_MARGIN,
+};
 use crate::derived::{feedback, largest_faults, sensor_noise};
 use crate::work::Work;
 use ftc_control::parameters::{
     Compensation, Estimator, EstimatorMethod, Harmonics, Limits, Predictor,
 };
+use ftc_control::tuning::UNKNOWN_VARIANCE;
 use ftc_plant::{Dimensions, Mode, SwitchedPlant};
 use ftc_plant::{Scenario, TruePlant};
 
@@ -69,28 +74,11 @@ impl Request {
     }
 }
 
-/// The smallest threshold that is chosen automatically, relative to the nominal value.
-const SMALLEST_THRESHOLD: f64 = 1e-3;
-
-/// A threshold opens by so much more than the largest known response to the disturbance before that
-/// is learned. While least squares learns, what is left of any such response stays below `1 / OPENING_FACTOR` of
-/// that opening (Cauchy-Schwarz), hence below the half from which the estimator learns.
-const OPENING_FACTOR: f64 = 2.5;
-
-/// Variance of a harmonic of which nothing is known, in units of the noise variance.
-const UNKNOWN_VARIANCE: f64 = 1e6;
-
-/// Seed of the commissioning run; any will do, but the same design must give the same bytes.
-const COMMISSIONING_SEED: u64 = 20;
-
 /// Least ratio of the weakest to the strongest excited direction of a recorded database.
 const LEAST_EXCITATION: f64 = 1e-4;
 
 /// The most entries of the least-squares problem of one mode: beyond it memory runs short.
 const MOST_REGRESSORS: usize = 20_000_000;
-
-/// Samples a sliding window holds beyond those its own inputs can explain.
-const WINDOW_MARGIN: usize = 20;
 
 /// Makes the design: synthesis of gains and observer, their certificate, the fault estimator.
 ///
@@ -113,6 +101,8 @@ pub fn assemble_with(request: Request, run: &Run) -> Result<Design, Failure> {
         .map_err(|large| DesignError::Request(large.into()))?;
     check_operating_inputs(&request.plant, &request.signals.inputs).map_err(DesignError::from)?;
     let asked = request.estimator.check(dims);
+    asked.map_err(DesignError::from)?;
+    let asked = request.estimator.check_modes(request.plant.modes.len());
     asked.map_err(DesignError::from)?;
     check_experiment(&request, dims).map_err(DesignError::from)?;
     let estimator = estimator(&request, dims).map_err(DesignError::from)?;
@@ -437,7 +427,7 @@ fn known_harmonics(
     Harmonics {
         period,
         count: known.harmonics,
-        memory: (10.0 * period).max(200.0),
+        memory: (MEMORY_PERIODS * period).max(LEAST_MEMORY),
         initial_variance: variance
             .unwrap_or(UNKNOWN_VARIANCE)
             .clamp(1.0, UNKNOWN_VARIANCE),

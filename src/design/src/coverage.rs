@@ -6,7 +6,7 @@
 use crate::augmented::scaled;
 use crate::derived;
 use crate::harmonics::{self, KnownDisturbance};
-use crate::hypotheses::{self, FAULT_RATES, MODEL_ERRORS};
+use crate::hypotheses::{self, FAULT_RATES, LENGTHS, MODEL_ERRORS};
 use crate::observer::{check_decoupling, lost_gains_fit};
 use crate::spec::LARGEST;
 use crate::{
@@ -14,10 +14,9 @@ use crate::{
 };
 use ftc_control::Matrix;
 use ftc_control::parameters::{
-    Estimator, EstimatorMethod, FeedbackGains, LEVERAGE_LIMIT, MOST_HARMONICS, ObserverKind,
-    Predictor,
+    Estimator, EstimatorMethod, FeedbackGains, MOST_HARMONICS, ObserverKind, Predictor,
 };
-use ftc_control::tuning::Tuning;
+use ftc_control::tuning::{LEVERAGE_LIMIT, Tuning};
 use ftc_plant::scaling::Scaling;
 use ftc_record::dense;
 use nalgebra::DMatrix;
@@ -326,14 +325,15 @@ fn hypotheses_fit(design: &Design) -> bool {
         derived.fitted.clone_from(&found.fitted);
         derived.noise.clone_from(&found.noise);
     }
+    // As a rate, since a length that is one over it has been rounded once more.
+    let [shortest, longest] = [LENGTHS.start(), LENGTHS.end()];
+    let length = |rate: f64| (1.0 / longest..=1.0 / shortest).contains(&rate);
     let positive = |&noise: &f64| noise > 0.0 && noise <= LARGEST;
     let chosen = found.noise.iter().all(positive)
         && MODEL_ERRORS.contains(&found.model_error)
         && FAULT_RATES.contains(&found.fault_rate)
-        && (1e-9..=0.5).contains(&found.release_rate)
-        && found
-            .mode_rate
-            .is_none_or(|rate| (1e-9..=0.5).contains(&rate));
+        && length(found.release_rate)
+        && found.mode_rate.is_none_or(length);
     chosen && derived == *found
 }
 

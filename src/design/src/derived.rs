@@ -2,21 +2,13 @@
 //! assembled, and again when it is checked.
 
 use crate::Signal;
+use crate::defaults::{LARGEST_FAULT, SMALLEST_NOISE, UNWINDING};
 use crate::feedforward;
 use crate::running_loop::{TRANSFER_DECAY, TransferCertificate};
 use ftc_control::parameters::{Limits, StateFeedback, Transfer};
 use ftc_control::tuning::DatabaseTuning;
 use ftc_plant::SwitchedPlant;
 use ftc_record::{dense, plain};
-
-/// Noise that the state-based estimator assumes at least, relative to the threshold.
-const SMALLEST_NOISE: f64 = 0.05;
-
-/// Share of what saturation took off that unwinds the integrator in one sample.
-const UNWINDING: f64 = 0.5;
-
-/// Largest fault of a sensor without a range, relative to the nominal value of its output.
-const LARGEST_FAULT: f64 = 1e6;
 
 /// The certified gains as the controller runs them, with or without reference feedforward. What saturation takes off an input unwinds
 /// the integral by half of what would undo it; inputs without a limit never saturate.

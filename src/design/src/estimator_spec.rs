@@ -1,9 +1,11 @@
 //! The fault estimator that is asked for, and the ranges of its numbers.
 
 use crate::commissioning::Database;
+use crate::defaults::DEBOUNCE;
 use crate::harmonics::KnownDisturbance;
 use crate::hypotheses::HypothesesSpec;
-use crate::spec::{EstimatorNumber, LARGEST, SMALLEST, SpecError, sizes_within, within};
+use crate::spec::{EstimatorNumber, SpecError, size_within, sizes_within, within};
+use ftc_control::estimator::hypotheses::MOST_MODES;
 use ftc_control::parameters::EstimatorMethod;
 use ftc_control::tuning::DatabaseTuning;
 use ftc_plant::Dimensions;
@@ -39,7 +41,7 @@ impl Default for EstimatorSpec {
             response_length: None,
             database: DatabaseSource::Commission,
             threshold: Threshold::Sigmas(DatabaseTuning::default().threshold_deviations),
-            debounce: 1,
+            debounce: DEBOUNCE,
             stuck_after: 0,
             adapt: false,
             disturbance: None,
@@ -56,7 +58,7 @@ impl EstimatorSpec {
     /// the database.
     ///
     /// # Errors
-    /// [`SpecError::Estimator`] or [`SpecError::EstimatorCount`].
+    /// [`SpecError::Estimator`], [`SpecError::EstimatorSize`] or [`SpecError::EstimatorCount`].
     pub fn check(&self, dims: Dimensions) -> Result<(), SpecError> {
         let longest = f64::from(LONGEST_DEBOUNCE);
         within(
@@ -74,10 +76,21 @@ impl EstimatorSpec {
                 sizes_within(EstimatorNumber::Threshold, sizes, dims.outputs)?;
             }
             Threshold::Sigmas(sigmas) => {
-                within(EstimatorNumber::Sigmas, *sigmas, SMALLEST..=LARGEST)?;
+                size_within(EstimatorNumber::Sigmas, *sigmas)?;
             }
         }
         self.hypotheses.check(dims)
+    }
+
+    /// Whether a mode that is to be found from the readings is one of few enough.
+    ///
+    /// # Errors
+    /// [`SpecError::TooManyModes`].
+    pub fn check_modes(&self, modes: usize) -> Result<(), SpecError> {
+        match self.hypotheses.mode_length.is_some() && modes > MOST_MODES {
+            true => Err(SpecError::TooManyModes(modes)),
+            false => Ok(()),
+        }
     }
 }
 
@@ -121,6 +134,16 @@ mod tests {
         let mut spec = EstimatorSpec::default();
         change(&mut spec);
         spec.check(dims).map_err(|error| error.to_string())
+    }
+
+    #[test]
+    fn a_mode_is_found_among_few_enough() {
+        let mut spec = EstimatorSpec::default();
+        assert_eq!(spec.check_modes(MOST_MODES + 1), Ok(()));
+        spec.hypotheses.mode_length = Some(500.0);
+        assert_eq!(spec.check_modes(MOST_MODES), Ok(()));
+        let said = spec.check_modes(10).unwrap_err().to_string();
+        assert!(said.starts_with("the mode is to be found among 10, but at most 9"));
     }
 
     #[test]

@@ -1,6 +1,11 @@
 //! Sizes and rates for the state-based estimator, from the plant and its signals.
 
 use crate::augmented;
+use crate::defaults::{
+    AUTHORITY, CHANGE_RATE, CHANGED_ERROR, DISTURBANCE, DISTURBANCE_WALK, DRIFT_WALK, FAULT_LENGTH,
+    FAULT_OF_RANGE, FAULT_RATE, FAULT_SIZE, FAULT_WALK, GAIN_ERROR, GAIN_WALK, INPUT_LOAD,
+    LOAD_RATE, LOAD_WALK, MODEL_ERROR, ODDS, PERIOD_ERROR, START, STATE_LOAD, STUCK_RATE,
+};
 use crate::harmonics::KnownDisturbance;
 use crate::spec::{EstimatorNumber, SpecError, sizes_within, within};
 use crate::steady_state::steady_state;
@@ -34,15 +39,15 @@ pub struct HypothesesSpec {
 pub(crate) const MODEL_ERRORS: RangeInclusive<f64> = 0.0..=1.0;
 /// Faults per sample and sensor that may be asked for.
 pub(crate) const FAULT_RATES: RangeInclusive<f64> = 1e-12..=0.1;
-/// Mean length of a mode in samples, where none is given.
-pub const MODE_LENGTH: f64 = 500.0;
+/// Mean lengths of a fault or of a mode in samples that may be asked for.
+pub(crate) const LENGTHS: RangeInclusive<f64> = 2.0..=1e9;
 
 impl Default for HypothesesSpec {
     fn default() -> Self {
         Self {
-            model_error: 0.05,
-            fault_rate: 1e-5,
-            fault_length: 1000.0,
+            model_error: MODEL_ERROR,
+            fault_rate: FAULT_RATE,
+            fault_length: FAULT_LENGTH,
             ambiguous: Ambiguous::TrustSensors,
             mode_length: None,
             authority: None,
@@ -51,62 +56,20 @@ impl Default for HypothesesSpec {
     }
 }
 
-/// Freezes per sample and sensor. Rarer than other faults: readings that agree with a constant for a
-/// while are common at rest.
-const STUCK_RATE: f64 = 1e-7;
-/// Jumps of a present fault per sample.
-const CHANGE_RATE: f64 = 1e-3;
-/// Jumps of loads or input gains per sample: as rare as faults.
-const LOAD_RATE: f64 = 1e-5;
-/// Relative error of the matrices of a plant that is no longer the model.
-const CHANGED_ERROR: f64 = 1.0;
-/// Log odds of a sensor's fault against the best explanation without one: 20 to 1.
-const ODDS: f64 = 3.0;
-/// Wander of an abrupt fault per sample, in noise deviations.
-const FAULT_WALK: f64 = 0.05;
-/// Wander of a fault that grew slowly per sample, in noise deviations.
-const DRIFT_WALK: f64 = 0.5;
-/// Size of a fault without a known range, relative to the nominal value and to the operating point.
-const FAULT_SIZE: [f64; 2] = [0.6, 0.5];
-/// Size of a fault relative to a known range.
-const FAULT_OF_RANGE: f64 = 0.5;
-/// Authority without a known range, relative to the nominal value (or what the references reach) and to the operating
-/// point. Wide, since a reading corrected by less than its fault may leave the loop unstable; finite, since so may a
-/// correction of a fault that is none.
-const AUTHORITY: [f64; 2] = [10.0, 8.0];
-/// Size of a load on an input relative to its nominal value.
-const INPUT_LOAD: f64 = 0.2;
-/// Displacement at rest by a load on a state, relative to the state's nominal value.
-const STATE_LOAD: f64 = 0.03;
-/// Wander of a load per sample relative to the size of its jumps.
-const LOAD_WALK: f64 = 5e-3;
-/// Wander of a disturbance per sample, relative to its size: what a sine with a period of ninety samples does at
-/// most. Less of it and a disturbance whose period is told wrong is taken for a gain of the inputs that it moves.
-const DISTURBANCE_WALK: f64 = 0.07;
-/// Relative error of an input's gain, and its wander per sample.
-const GAIN_ERROR: f64 = 0.3;
-const GAIN_WALK: f64 = 1e-4;
-/// Relative error of the disturbance's period.
-const PERIOD_ERROR: f64 = 0.05;
-/// How far the disturbance may move an output where its size is not known, relative to nominal.
-const DISTURBANCE: f64 = 0.05;
-/// Error of the state at the start relative to its nominal value.
-const START: f64 = 3e-3;
-
 impl HypothesesSpec {
     /// Whether every number lies in its range, for a plant of these sizes.
     ///
     /// # Errors
-    /// [`SpecError::Estimator`] or [`SpecError::EstimatorCount`].
+    /// [`SpecError::Estimator`], [`SpecError::EstimatorSize`] or [`SpecError::EstimatorCount`].
     pub fn check(&self, dims: Dimensions) -> Result<(), SpecError> {
         use EstimatorNumber::{
             Authority, FaultLength, FaultRate, InputLoad, ModeLength, ModelError,
         };
         within(ModelError, self.model_error, MODEL_ERRORS)?;
         within(FaultRate, self.fault_rate, FAULT_RATES)?;
-        within(FaultLength, self.fault_length, 2.0..=1e9)?;
+        within(FaultLength, self.fault_length, LENGTHS)?;
         if let Some(length) = self.mode_length {
-            within(ModeLength, length, 2.0..=1e9)?;
+            within(ModeLength, length, LENGTHS)?;
         }
         if let Some(sizes) = &self.authority {
             sizes_within(Authority, sizes, dims.outputs)?;

@@ -35,6 +35,7 @@ pub mod certificate;
 pub mod commissioning;
 mod controllability;
 pub mod coverage;
+mod defaults;
 pub mod derived;
 mod estimator_spec;
 mod feedforward;
@@ -68,11 +69,12 @@ pub mod work;
 pub use blocks::{BlockKind, BlockName};
 pub use certificate::{CertificateError, ControlCertificate};
 pub use controllability::{Uncontrollable, check_controllable};
+pub use defaults::MODE_LENGTH;
 pub use finished::Design;
 pub use ftc_record::{
     ControllerDesign, DesignRecord, FORMAT, RecordError, Signal, Signals, dense, mode_models, plain,
 };
-pub use hypotheses::{HypothesesSpec, MODE_LENGTH};
+pub use hypotheses::HypothesesSpec;
 pub use lyapunov::{DwellTime, Lyapunov};
 pub use observer::{LostCertificate, ObserverCertificate, ObserverDesign};
 pub use parallel::MOST_THREADS;

@@ -1,10 +1,14 @@
 //! What the user asks for.
 
 use super::Lyapunov;
+use super::defaults::{DECAY, INPUT_WEIGHT, INTEGRAL_WEIGHT, OUTPUT_WEIGHT};
 use super::words::counted;
 use core::f64::consts::{PI, TAU};
+use ftc_control::estimator::hypotheses::MOST_MODES;
+pub use ftc_control::parameters::LONGEST_LATENCY;
 use ftc_plant::Dimensions;
 pub use ftc_plant::number::{LARGEST, SMALLEST};
+use ftc_plant::number::{NumberError, positive};
 use ftc_plant::scaling::Scaling;
 use serde::{Deserialize, Serialize};
 use std::fmt;
@@ -37,9 +41,6 @@ pub struct ControlSpec {
     pub input_weight: Vec<f64>,
 }
 
-/// The longest latency in samples.
-pub const LONGEST_LATENCY: usize = 1;
-
 /// What is wrong with a request, whatever the plant's numbers. Outputs and harmonics count from 1.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
@@ -68,8 +69,8 @@ pub enum SpecError {
     /// An output is tracked twice.
     #[error("output {0} is to be tracked twice: name it once")]
     TrackedTwice(usize),
-    /// The latency is neither 0 nor 1 samples.
-    #[error("the latency is {0} samples: give 0 or 1")]
+    /// The latency is longer than [`LONGEST_LATENCY`].
+    #[error("the latency is {0} samples: give 0 to {LONGEST_LATENCY}")]
     Latency(usize),
     /// A decay rate outside (0, 1].
     #[error("{of} is {decay}: give a number above 0 and at most 1")]
@@ -137,6 +138,19 @@ pub enum SpecError {
         /// The most allowed.
         most: f64,
     },
+    /// A size that the estimator is told is not positive.
+    #[error("{of} {error}")]
+    EstimatorSize {
+        /// Which size.
+        of: EstimatorNumber,
+        /// What is wrong with it.
+        error: NumberError,
+    },
+    /// The plant has more modes than can be told apart by the readings.
+    #[error(
+        "the mode is to be found among {0}, but at most {MOST_MODES} can be told apart: tell the mode"
+    )]
+    TooManyModes(usize),
     /// A list of the estimator's numbers has the wrong length.
     #[error("{of} has {}: give {needed}", counted(*.found, "entry", "entries"))]
     EstimatorCount {
@@ -263,12 +277,16 @@ impl ControlSpec {
         Self {
             latency: 0,
             lyapunov: Lyapunov::Common,
-            decay: 0.95,
+            decay: DECAY,
             objective: Objective::Attenuation,
             resonators: Vec::new(),
-            output_weight: weights(1.0),
-            integral_weight: weights(0.3),
-            input_weight: scaling.inputs.iter().map(|nominal| 0.1 / nominal).collect(),
+            output_weight: weights(OUTPUT_WEIGHT),
+            integral_weight: weights(INTEGRAL_WEIGHT),
+            input_weight: scaling
+                .inputs
+                .iter()
+                .map(|nominal| INPUT_WEIGHT / nominal)
+                .collect(),
             tracked,
         }
     }
@@ -404,7 +422,12 @@ pub(crate) fn sizes_within(
         });
     }
     let mut sizes = sizes.iter();
-    sizes.try_for_each(|&size| within(of, size, SMALLEST..=LARGEST))
+    sizes.try_for_each(|&size| size_within(of, size))
+}
+
+/// Whether a size is positive and of practical magnitude.
+pub(crate) fn size_within(of: EstimatorNumber, size: f64) -> Result<(), SpecError> {
+    positive(size).map_err(|error| SpecError::EstimatorSize { of, error })
 }
 
 /// A decay rate lies in (0, 1]; strictly below 1 where a dwell time must come out of it.

@@ -1,6 +1,7 @@
 //! The sizes of a plant, and the check that every matrix has them.
 
 use super::error::PlantError;
+use super::number::positive;
 use super::{Mode, OperatingPoint, SwitchedPlant};
 
 /// Numbers of states `n`, inputs `m`, outputs `p` and disturbances `s`.
@@ -26,9 +27,7 @@ impl Dimensions {
         if plant.modes.is_empty() {
             return Err(PlantError::NoMode);
         }
-        if !(plant.sample_time.is_finite() && plant.sample_time > 0.0) {
-            return Err(PlantError::SampleTime(plant.sample_time));
-        }
+        positive(plant.sample_time).map_err(PlantError::SampleTime)?;
         let dims = plant.dimensions();
         for (what, size) in [
             ("states (rows of A)", dims.states),

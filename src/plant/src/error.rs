@@ -1,5 +1,7 @@
 //! What can be wrong with a plant.
 
+use super::number::NumberError;
+
 /// Why a plant is refused. Modes, rows and columns count from 1.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
@@ -8,8 +10,8 @@ pub enum PlantError {
     #[error("the plant has no mode: give at least one")]
     NoMode,
     /// The sample time (seconds) is not positive.
-    #[error("the sample time is {0}: give a positive number of seconds")]
-    SampleTime(f64),
+    #[error("the sample time, in seconds, {0}")]
+    SampleTime(NumberError),
     /// A size is zero.
     #[error("mode 1 has no {0}: give at least one")]
     Empty(&'static str),

@@ -152,6 +152,66 @@ pub enum FaultKind {
     Dropout,
 }
 
+/// The kinds of faults by name: what a file, a table or a random draw tells apart.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+#[expect(
+    clippy::exhaustive_enums,
+    reason = "a new kind must be read and drawn everywhere: the compiler says where"
+)]
+pub enum FaultName {
+    /// [`FaultKind::Bias`].
+    Bias,
+    /// [`FaultKind::Drift`].
+    Drift,
+    /// [`FaultKind::GainLoss`].
+    GainLoss,
+    /// [`FaultKind::Stuck`].
+    Stuck,
+    /// [`FaultKind::Intermittent`].
+    Intermittent,
+    /// [`FaultKind::Dropout`].
+    Dropout,
+}
+
+impl FaultName {
+    /// All of them.
+    pub const ALL: [Self; 6] = [
+        Self::Bias,
+        Self::Drift,
+        Self::GainLoss,
+        Self::Stuck,
+        Self::Intermittent,
+        Self::Dropout,
+    ];
+
+    /// Its letters, which are those of the serialised form, too.
+    pub const fn letters(self) -> &'static str {
+        match self {
+            Self::Bias => "bias",
+            Self::Drift => "drift",
+            Self::GainLoss => "gain-loss",
+            Self::Stuck => "stuck",
+            Self::Intermittent => "intermittent",
+            Self::Dropout => "dropout",
+        }
+    }
+}
+
+impl FaultKind {
+    /// The name of its kind.
+    pub const fn name(&self) -> FaultName {
+        match self {
+            Self::Bias { .. } => FaultName::Bias,
+            Self::Drift { .. } => FaultName::Drift,
+            Self::GainLoss { .. } => FaultName::GainLoss,
+            Self::Stuck => FaultName::Stuck,
+            Self::Intermittent { .. } => FaultName::Intermittent,
+            Self::Dropout => FaultName::Dropout,
+        }
+    }
+}
+
 /// What an importer may do to a reading while the plant FMU runs; its number is its place in `ALL`, from 1 on.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[expect(
@@ -335,6 +395,19 @@ mod tests {
                     "{time} {sample_time}"
                 );
             }
+        }
+    }
+
+    #[test]
+    fn every_kind_is_listed_and_read_by_its_letters() {
+        type Letters = serde::de::value::StrDeserializer<'static, serde::de::value::Error>;
+        assert_eq!(FaultName::ALL.len(), FaultName::Dropout as usize + 1);
+        for (at, name) in FaultName::ALL.into_iter().enumerate() {
+            assert_eq!(name as usize, at);
+            assert_eq!(
+                FaultName::deserialize(Letters::new(name.letters())),
+                Ok(name)
+            );
         }
     }
 

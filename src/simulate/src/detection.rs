@@ -31,16 +31,14 @@ pub struct FaultDetection {
 impl FaultDetection {
     /// Of an event that is not seen yet.
     fn new(event: &FaultEvent, sample_time: f64) -> Self {
-        let (kind, size) = match event.kind {
-            FaultKind::Bias { size } => ("bias", size),
-            FaultKind::Drift { slope } => ("drift", slope * (event.until - event.from)),
-            FaultKind::GainLoss { loss } => ("gain-loss", loss),
-            FaultKind::Stuck => ("stuck", 0.0),
-            FaultKind::Intermittent { size, .. } => ("intermittent", size),
-            FaultKind::Dropout => ("dropout", 0.0),
+        let size = match event.kind {
+            FaultKind::Bias { size } | FaultKind::Intermittent { size, .. } => size,
+            FaultKind::Drift { slope } => slope * (event.until - event.from),
+            FaultKind::GainLoss { loss } => loss,
+            FaultKind::Stuck | FaultKind::Dropout => 0.0,
         };
         Self {
-            kind: kind.into(),
+            kind: event.kind.name().letters().into(),
             sensor: event.sensor,
             from: first_tick(event.from, sample_time),
             until: first_tick(event.until, sample_time),

@@ -4,7 +4,7 @@ use crate::Options;
 use chacha20::ChaCha8Rng;
 use chacha20::rand_core::{Rng, SeedableRng};
 use ftc_design::Design;
-use ftc_plant::scenario::{FaultEvent, FaultKind, ModeInterval, Scenario, Waveform};
+use ftc_plant::scenario::{FaultEvent, FaultKind, FaultName, ModeInterval, Scenario, Waveform};
 use ftc_plant::{SwitchedPlant, TruePlant};
 use nalgebra::DMatrix;
 
@@ -225,20 +225,21 @@ fn fault(design: &Design, options: &Options, draws: &mut Draws) -> FaultEvent {
     let threshold = design.controller.estimator.thresholds.get(sensor);
     let size = draws.sign() * draws.ratio([1.0, options.largest_fault.max(1.0 + 1e-9)]);
     let size = size * threshold.copied().unwrap_or(1.0);
-    let kind = match draws.below(6) {
-        0 => FaultKind::Bias { size },
-        1 => FaultKind::Drift {
+    let kinds = FaultName::ALL;
+    let kind = match kinds[draws.below(kinds.len() as u64) as usize] {
+        FaultName::Bias => FaultKind::Bias { size },
+        FaultName::Drift => FaultKind::Drift {
             slope: size / duration,
         },
-        2 => FaultKind::GainLoss {
+        FaultName::GainLoss => FaultKind::GainLoss {
             loss: draws.between(LOSS),
         },
-        3 => FaultKind::Stuck,
-        4 => FaultKind::Intermittent {
+        FaultName::Stuck => FaultKind::Stuck,
+        FaultName::Intermittent => FaultKind::Intermittent {
             size,
             period: te * draws.ratio(PERIOD),
         },
-        _ => FaultKind::Dropout,
+        FaultName::Dropout => FaultKind::Dropout,
     };
     FaultEvent {
         sensor,

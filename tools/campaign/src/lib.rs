@@ -49,6 +49,9 @@ use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 /// Runs that are worked on together; what is kept in memory is bounded by it.
 const BATCH: u64 = 256;
 
+/// Runs of a campaign, where no number is given.
+pub const RUNS: u64 = 1000;
+
 /// The most faults that a run may be asked to have.
 pub const MOST_FAULTS: u32 = 16;
 

@@ -5,7 +5,7 @@ use crate::progress::{Progress, Runs};
 use crate::rows::{self, Rows};
 use crate::{check_output, failure::Failure};
 use campaign::files::{self, PAGE, RESULT};
-use campaign::{Options, OptionsError, Partial, Watch};
+use campaign::{Options, OptionsError, Partial, RUNS, Watch};
 use clap::Args;
 use ftc_design::{Design, MOST_THREADS};
 use report::Made;
@@ -13,9 +13,6 @@ use std::fmt::Write as _;
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
-
-/// Runs of a campaign, where no number is given.
-const RUNS: u64 = 1000;
 
 /// The arguments of `campaign`.
 #[derive(Args)]
@@ -25,12 +22,13 @@ pub struct Arguments {
     /// Directory to write to; made if it does not exist.
     #[arg(long, value_name = "DIR")]
     out: PathBuf,
-    /// Number of runs of the whole campaign: 1000 if left out; with --merge and --resume as many as
-    /// were asked for before.
-    #[arg(long, value_parser = whole::<u64>(1, 1_000_000_000), allow_negative_numbers = true)]
+    #[arg(long, value_parser = whole::<u64>(1, 1_000_000_000), allow_negative_numbers = true, help = format!(
+        "Number of runs of the whole campaign: {RUNS} if left out; with --merge and --resume as many as were asked for \
+         before"
+    ))]
     runs: Option<u64>,
     /// Seed: the same one gives the same runs.
-    #[arg(long, default_value_t = 1, value_parser = whole::<u64>(0, u64::MAX), allow_negative_numbers = true)]
+    #[arg(long, default_value_t = Options::default().seed, value_parser = whole::<u64>(0, u64::MAX), allow_negative_numbers = true)]
     seed: u64,
     /// Threads; as many as the machine has if left out. The results do not depend on it.
     #[arg(long, value_parser = whole::<u16>(1, MOST_THREADS as u64), allow_negative_numbers = true)]
@@ -52,9 +50,10 @@ pub struct Arguments {
     #[arg(long, value_name = "RUN", conflicts_with_all = ["shard", "rows", "resume"], allow_negative_numbers = true,
           value_parser = whole::<u64>(0, u64::MAX))]
     replay: Option<u64>,
-    /// Largest relative error of the entries of A, B and E (sampled); 0.02 if left out, and none of a
-    /// nonlinear plant.
-    #[arg(long, value_parser = number, allow_negative_numbers = true)]
+    #[arg(long, value_parser = number, allow_negative_numbers = true, help = format!(
+        "Largest relative error of the entries of A, B and E (sampled); {} if left out, and none of a nonlinear plant",
+        Options::default().model_error
+    ))]
     model_error: Option<f64>,
     /// Largest fault, in thresholds of its sensor.
     #[arg(long, default_value_t = Options::default().largest_fault, value_parser = number, allow_negative_numbers = true)]

@@ -4,7 +4,6 @@
 
 use crate::check;
 use crate::complaint::{Complaint, Key, at};
-use crate::defaults;
 use crate::estimator::estimator;
 use crate::experiment::ScenarioContext;
 use crate::healthy_log::Logs;
@@ -17,7 +16,6 @@ use crate::signal::Tables;
 use crate::true_plant;
 use crate::values::{NumberOrList, Which};
 use crate::wording;
-use ftc_control::estimator::hypotheses::MOST_MODES;
 use ftc_control::parameters;
 use ftc_design::assembly::{KnownDisturbance, Request};
 use ftc_design::spec::LONGEST_LATENCY;
@@ -49,7 +47,9 @@ pub(crate) fn request(
     let dims = plant.dimensions();
     let disturbance = disturbance(file, dims)?;
     let mut control = control(&file.controller, &signals, dims)?;
-    control.resonators = resonators(file, disturbance.as_ref())?;
+    if let Some(wanted) = file.controller.internal_model {
+        control.resonators = resonators(wanted, file.sample_time, disturbance.as_ref())?;
+    }
     control
         .check(dims)
         .map_err(|error| wording::of_spec(&error))?;
@@ -63,15 +63,9 @@ pub(crate) fn request(
         notes,
     };
     let estimator = estimator(&file.estimator, disturbance, dims, &logs)?;
-    if estimator.hypotheses.mode_length.is_some() && plant.modes.len() > MOST_MODES {
-        return Err(Complaint::of(
-            "estimator.mode",
-            format!(
-                "= \"estimated\" finds one of at most {MOST_MODES} modes, but the plant has {}: tell the mode",
-                plant.modes.len()
-            ),
-        ));
-    }
+    estimator
+        .check_modes(plant.modes.len())
+        .map_err(|error| wording::of_spec(&error))?;
     let scenario = ScenarioContext {
         scenario: &file.scenario,
         known: estimator.disturbance.as_ref(),
@@ -310,13 +304,13 @@ fn control(
 
 /// The angles of the internal model's resonators; none where no internal model is wanted.
 fn resonators(
-    file: &DesignFile,
+    wanted: bool,
+    sample_time: f64,
     disturbance: Option<&KnownDisturbance>,
 ) -> Result<Vec<f64>, Complaint> {
-    let wanted = file.controller.internal_model;
-    match (wanted.unwrap_or(defaults::INTERNAL_MODEL), disturbance) {
+    match (wanted, disturbance) {
         (false, _) => Ok(Vec::new()),
-        (true, Some(known)) => Ok(known.angles(file.sample_time)),
+        (true, Some(known)) => Ok(known.angles(sample_time)),
         (true, None) => Err(Complaint::of(
             "controller.internal_model",
             "= true needs to know the disturbance: give [disturbance] with its period",

@@ -50,8 +50,6 @@
 
 use ftc_plant::Scenario;
 
-/// `controller.internal_model`
-pub const INTERNAL_MODEL: bool = false;
 /// `scenario.steps`
 pub const STEPS: u64 = 1000;
 /// `scenario.seed`

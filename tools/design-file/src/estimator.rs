@@ -127,11 +127,7 @@ fn hypotheses(given: &schema::Estimator, dims: Dimensions) -> Result<HypothesesS
     let usual = HypothesesSpec::default();
     let sizes = |key: &str, value: &Option<NumberOrList>, count: usize| match value {
         None => Ok(None),
-        Some(value) => {
-            let values = at(key, value.spread(count))?;
-            at(key, check::each(&values, check::positive))?;
-            Ok::<_, Complaint>(Some(values))
-        }
+        Some(value) => at(key, value.spread(count)).map(Some),
     };
     let estimated = given.mode == Some(schema::ModeSource::Estimated);
     let mode_length = match (estimated, given.mode_length) {
@@ -220,13 +216,9 @@ fn threshold(
         )),
         (Some(threshold), None) => {
             let values = at("estimator.threshold", threshold.spread(dims.outputs))?;
-            at("estimator.threshold", check::each(&values, check::positive))?;
             Ok(Threshold::Given(values))
         }
         (None, None) => Ok(usual),
-        (None, Some(sigmas)) => {
-            at("estimator.sigmas", check::positive(sigmas))?;
-            Ok(Threshold::Sigmas(sigmas))
-        }
+        (None, Some(sigmas)) => Ok(Threshold::Sigmas(sigmas)),
     }
 }

@@ -3,14 +3,14 @@
 use crate::complaint::{Complaint, at};
 use crate::signal::{never, only, present};
 use crate::values::Which;
-use ftc_plant::scenario::{FaultEvent, FaultKind};
+use ftc_plant::scenario::{FaultEvent, FaultKind, FaultName};
 use serde::Deserialize;
 
 /// A fault of one sensor or actuator during `[from, until)` seconds.
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Event {
-    kind: Kind,
+    kind: FaultName,
     sensor: Option<Which>,
     input: Option<Which>,
     /// Seconds.
@@ -23,35 +23,14 @@ pub struct Event {
     period: Option<f64>,
 }
 
-/// Values of an event's `kind`.
-#[derive(Clone, Copy, Debug, Deserialize)]
-#[serde(rename_all = "kebab-case")]
-enum Kind {
-    /// Adds `size`.
-    Bias,
-    /// Adds `slope` per second.
-    Drift,
-    /// Loses the fraction `loss` of the reading.
-    GainLoss,
-    /// Keeps the last reading.
-    Stuck,
-    /// Adds `size` during the first half of each `period`.
-    Intermittent,
-    /// Gives no number.
-    Dropout,
-}
-
-impl Kind {
-    /// Its name, and the keys that describe it.
-    fn keys(self) -> (&'static str, &'static [&'static str]) {
-        match self {
-            Self::Bias => ("bias", &["size"]),
-            Self::Drift => ("drift", &["slope"]),
-            Self::GainLoss => ("gain-loss", &["loss"]),
-            Self::Stuck => ("stuck", &[]),
-            Self::Intermittent => ("intermittent", &["size", "period"]),
-            Self::Dropout => ("dropout", &[]),
-        }
+/// The keys that describe a fault of this kind.
+fn keys(kind: FaultName) -> &'static [&'static str] {
+    match kind {
+        FaultName::Bias => &["size"],
+        FaultName::Drift => &["slope"],
+        FaultName::GainLoss => &["loss"],
+        FaultName::Intermittent => &["size", "period"],
+        FaultName::Stuck | FaultName::Dropout => &[],
     }
 }
 
@@ -95,23 +74,22 @@ impl Event {
     }
 
     fn fault_of(&self, what: &str, names: &[&str], things: &str) -> Result<FaultEvent, Complaint> {
-        let (name, keys) = self.kind.keys();
-        only(name, keys, &self.given())?;
+        only(self.kind.letters(), keys(self.kind), &self.given())?;
         let size = || present("size", self.size);
         let kind = match self.kind {
-            Kind::Bias => FaultKind::Bias { size: size()? },
-            Kind::Drift => FaultKind::Drift {
+            FaultName::Bias => FaultKind::Bias { size: size()? },
+            FaultName::Drift => FaultKind::Drift {
                 slope: present("slope", self.slope)?,
             },
-            Kind::GainLoss => FaultKind::GainLoss {
+            FaultName::GainLoss => FaultKind::GainLoss {
                 loss: present("loss", self.loss)?,
             },
-            Kind::Stuck => FaultKind::Stuck,
-            Kind::Intermittent => FaultKind::Intermittent {
+            FaultName::Stuck => FaultKind::Stuck,
+            FaultName::Intermittent => FaultKind::Intermittent {
                 size: size()?,
                 period: present("period", self.period)?,
             },
-            Kind::Dropout => FaultKind::Dropout,
+            FaultName::Dropout => FaultKind::Dropout,
         };
         Ok(FaultEvent {
             sensor: at(what, self.place(what)?.index(names, things))?,

@@ -10,8 +10,9 @@ use crate::check::ValueError;
 use crate::complaint::{Complaint, Key};
 use crate::sentence::shorten;
 use crate::values::NameOrList;
+use ftc_control::estimator::hypotheses::MOST_MODES;
 use ftc_design::commissioning::{CommissioningError, LONGEST_RESPONSE};
-use ftc_design::spec::LARGEST;
+use ftc_design::spec::{LARGEST, LONGEST_LATENCY};
 use ftc_design::work::{MOST_BYTES, TooLarge};
 use ftc_design::{
     Advice, DecayRate, DesignError, EstimatorNumber, Infeasibility, Lyapunov, RequestError,
@@ -205,10 +206,7 @@ fn in_mode(number: usize) -> Key {
 /// What is wrong with a plant.
 pub(crate) fn of_plant(error: &PlantError) -> Complaint {
     match error {
-        PlantError::SampleTime(given) => Complaint::of(
-            "sample_time",
-            format!("is {given}: give a positive number of seconds"),
-        ),
+        PlantError::SampleTime(error) => Complaint::of("sample_time", error),
         PlantError::Empty(what) => Complaint::of(
             in_mode(1),
             format!(": there are no {what}: give at least one"),
@@ -329,9 +327,14 @@ pub(crate) fn of_spec(error: &SpecError) -> Complaint {
             "controller.tracked",
             format!("names output {output} twice: name each output once"),
         ),
-        SpecError::Latency(latency) => {
-            Complaint::of("controller.latency", format!("is {latency}: give 0 or 1"))
-        }
+        SpecError::Latency(latency) => Complaint::of(
+            "controller.latency",
+            ValueError::Count {
+                value: i64::try_from(*latency).unwrap_or(i64::MAX),
+                least: 0,
+                most: LONGEST_LATENCY,
+            },
+        ),
         SpecError::Decay { of, decay } => Complaint::of(
             decay_key(*of),
             format!("is {decay}: give a number above 0 and at most 1"),
@@ -372,6 +375,20 @@ pub(crate) fn of_spec(error: &SpecError) -> Complaint {
         SpecError::Weight { weight, value } => Complaint::of(
             weight_key(*weight),
             format!("has the value {value}: give 0 or a positive number up to {LARGEST:e}"),
+        ),
+        SpecError::EstimatorSize { of, error } => Complaint::of(estimator_key(*of), error),
+        SpecError::EstimatorCount { of, found, needed } => Complaint::of(
+            estimator_key(*of),
+            ValueError::Entries {
+                found: *found,
+                needed: *needed,
+            },
+        ),
+        SpecError::TooManyModes(modes) => Complaint::of(
+            "estimator.mode",
+            format!(
+                "= \"estimated\" finds one of at most {MOST_MODES} modes, but the plant has {modes}: tell the mode"
+            ),
         ),
         SpecError::Estimator {
             of,

@@ -33,7 +33,7 @@ pub use error::{EntryError, Error, MatrixError, TimeColumnError, TimeError};
 pub use regular::{open_regular, read_regular};
 pub use resample::{Interpolation, resample};
 pub use table::{MOST_ROWS, Place, Row, Table};
-pub use time::{Clock, TimeColumn, find_time_column};
+pub use time::{Clock, DRIFT, TimeColumn, find_time_column};
 
 /// Longest quotation from the user's file.
 pub const QUOTATION: usize = 60;

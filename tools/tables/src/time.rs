@@ -47,7 +47,7 @@ const JITTER: f64 = 0.05;
 /// a row lost or doubled is always noticed.
 const ROUNDING: f64 = 0.499;
 /// How far the mean step may be from the sample time, relative to it: quartz clocks are a tenth of that.
-const DRIFT: f64 = 1e-3;
+pub const DRIFT: f64 = 1e-3;
 
 /// The column that tells the time.
 #[derive(Clone, Debug, PartialEq)]

@@ -7,7 +7,7 @@ use super::linear::{
     add_row, combine, dot, factor, mirror, padded, solve, sparse_dot, subtract_squares, turn,
 };
 use super::model::{Jump, Layout, ModeModel};
-use crate::kernel::bounded;
+use crate::kernel::{LARGEST, bounded};
 use crate::parameters::Hypotheses as Settings;
 use crate::tuning::BankTuning;
 use alloc::vec;
@@ -238,7 +238,7 @@ impl Innovation {
         let mut log = 0.0;
         for q in 0..p {
             product *= self.s[q * p + q];
-            if !(1e-100..1e100).contains(&product) {
+            if !(1.0 / LARGEST..LARGEST).contains(&product) {
                 log += libm::log(product);
                 product = 1.0;
             }

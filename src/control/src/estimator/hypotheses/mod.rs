@@ -32,6 +32,7 @@ pub use model::Layout;
 
 use super::super::parameters::Hypotheses;
 use crate::compensation::is_measurement;
+use crate::kernel::LARGEST;
 use candidates::Candidates;
 use expectation::Expectation;
 use hypothesis::{Innovation, Step};
@@ -42,6 +43,8 @@ use serde::{Deserialize, Serialize};
 
 /// Most modes where the mode is not told: each but the leading one needs a hypothesis.
 pub const MOST_MODES: usize = 9;
+/// Least deviation of a sensor's noise, output units: its square is far above underflow.
+const SMALLEST_NOISE: f64 = 1e-150;
 /// Most hypotheses that may exist while a sample is judged.
 const SLOTS: usize = 2 * MOST_KEPT + MOST_MODES - 1;
 
@@ -249,7 +252,8 @@ impl Bank {
         for ((deviation, (&threshold, &share)), &ratio) in
             noise.iter_mut().zip(scales).zip(&state.noise_ratio)
         {
-            *deviation = (threshold.abs() * share * libm::sqrt(ratio)).clamp(1e-150, 1e100);
+            *deviation =
+                (threshold.abs() * share * libm::sqrt(ratio)).clamp(SMALLEST_NOISE, LARGEST);
         }
         let mut valid = 0;
         for (q, &value) in y.iter().enumerate().take(Sensors::BITS as usize) {
