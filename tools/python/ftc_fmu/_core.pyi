@@ -1,6 +1,9 @@
 from collections.abc import Callable
 from typing import final
 
+RUNS: int
+DRIFT: float
+
 @final
 class Design:
     def json(self) -> str: ...

@@ -64,7 +64,7 @@ class Campaign:
 
 def campaign(
     design: Design,
-    runs: int = 1000,
+    runs: int = _core.RUNS,
     *,
     client: Client | None = None,
     jobs: int | None = None,

@@ -20,10 +20,6 @@ if TYPE_CHECKING:
     import pandas as pd
 
 
-# How far a log's mean step may be from the sample time that is said, relative to it, as in files.
-DRIFT = 1e-3
-
-
 @dataclass(frozen=True)
 class Log:
     """Samples of healthy operation at a fixed rate; row k holds the inputs that act from it on and the outputs there.
@@ -209,7 +205,7 @@ def _rate(t: np.ndarray | None, said: float | None) -> float:
             )
         return said
     found = _sample_time(t)
-    if said is not None and abs(found - said) > DRIFT * said:
+    if said is not None and abs(found - said) > _core.DRIFT * said:
         raise DesignFileError(
             f"the rows are {found:.6g} s apart on average, sample_time is {said:.6g}: give the log's, or none",
             "sample_time",

@@ -3,6 +3,7 @@
 use crate::errors;
 use crate::waiting::wait;
 use ftc_identify::{Coordinates, Identified, IdentifiedMode, Log, Settings};
+use ftc_plant::Mode;
 use nalgebra::{DMatrix, DVector};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
@@ -34,18 +35,19 @@ fn list(values: &DVector<f64>) -> Vec<f64> {
 #[pyfunction]
 pub fn discretise(a: Rows, b: Rows, sample_time: f64) -> PyResult<(Rows, Rows)> {
     let (a, b) = (matrix(&a)?, matrix(&b)?);
-    let (n, m) = (a.nrows(), b.ncols());
-    let mut both = DMatrix::zeros(n + m, n + m);
-    both.view_mut((0, 0), (n, n)).copy_from(&(a * sample_time));
-    both.view_mut((0, n), (n, m)).copy_from(&(b * sample_time));
-    let exact = both.exp();
-    if !exact.iter().all(|value| value.is_finite()) {
+    let c = DMatrix::zeros(0, a.nrows());
+    let exact = Mode::new(a, b, c).sampled(sample_time);
+    if !exact
+        .a
+        .iter()
+        .chain(&exact.b)
+        .all(|value| value.is_finite())
+    {
         let what =
             "the model grows beyond all numbers within one sample: give a shorter sample time";
         return Err(PyValueError::new_err(what));
     }
-    let part = |column, width| rows(&exact.view((0, column), (n, width)).into_owned());
-    Ok((part(0, n), part(n, m)))
+    Ok((rows(&exact.a), rows(&exact.b)))
 }
 
 /// Which column tells the time, from 0, and the seconds of its unit; none where no name is a usual one.

@@ -29,6 +29,12 @@ mod _core {
     use super::identification::{discretise, identify, time_column};
     #[pymodule_export]
     use super::run::Run;
+    /// Runs of a campaign, where no number is given.
+    #[pymodule_export]
+    const RUNS: u64 = campaign::RUNS;
+    /// How far a log's mean step may be from its sample time, relative to it.
+    #[pymodule_export]
+    const DRIFT: f64 = ftc_tables::DRIFT;
     #[pymodule_export]
     use super::{example, examples, main, platforms, verify, version};
 }
