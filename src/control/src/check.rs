@@ -2,8 +2,7 @@
 
 use crate::error::ControllerError;
 use crate::estimator::hypotheses::{MOST_MODES, Sensors};
-use crate::kernel;
-use crate::kernel::LARGEST;
+use crate::kernel::{self, LARGEST};
 use crate::matrix::Matrix;
 use crate::parameters::{
     ControllerParameters, Estimator, EstimatorMethod, Harmonics, Hypotheses, LONGEST_LATENCY,
