@@ -40,11 +40,13 @@ fn disturbance(harmonics: usize) -> KnownDisturbance {
 }
 
 fn design(channel: Channel, control: ControlSpec) -> Design {
+    let mut experiment = scenario(reference("sine"), 0.0, 1);
+    experiment.reference.truncate(control.tracked.len());
     let mut request = Request::new(
         "resonant",
         plant(channel),
         Signals::numbered(plant(channel).dimensions()),
-        scenario(reference("sine"), 0.0, 1),
+        experiment,
     );
     request.observer = ObserverSpec::new(ObserverChoice::Auto, 0.7, control.lyapunov);
     request.estimator.method = EstimatorMethod::Reference;

@@ -15,7 +15,7 @@ use std::collections::BTreeSet;
 use std::fmt;
 
 /// The mark, and the fingerprint of the layout that it stands for.
-const KNOWN: ([u8; 8], u64) = (*b"FTCFMU\0\x05", 0xf6a1_0289_9686_9c5f);
+const KNOWN: ([u8; 8], u64) = (*b"FTCFMU\0\x06", 0xa50e_0620_dc2d_38f0);
 
 /// Fields in the order in which they are written, and the kinds of what they hold.
 struct Layout(String);

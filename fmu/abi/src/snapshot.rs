@@ -7,7 +7,7 @@ use postcard::ser_flavors::Flavor;
 use serde::{Deserialize, Serialize, de::DeserializeOwned};
 
 /// Marks serialised states, with the version of their layout.
-pub const MARK: [u8; 8] = *b"FTCFMU\0\x05";
+pub const MARK: [u8; 8] = *b"FTCFMU\0\x06";
 
 /// Length of the checksum at the end.
 const CHECKSUM: usize = size_of::<u32>();

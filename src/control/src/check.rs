@@ -2,8 +2,8 @@
 
 use crate::error::ControllerError;
 use crate::estimator::hypotheses::{MOST_MODES, Sensors};
-use crate::kernel::{self, LARGEST};
-use crate::matrix::Matrix;
+use crate::kernel::LARGEST;
+use crate::matrix::{Matrix, all_finite};
 use crate::parameters::{
     ControllerParameters, Estimator, EstimatorMethod, Harmonics, Hypotheses, LONGEST_LATENCY,
     Limits, MOST_HARMONICS, Observer, Predictor, StateFeedback,
@@ -35,7 +35,7 @@ fn length(field: impl Into<String>, found: usize, needed: usize) -> Checked {
 }
 
 fn finite(field: impl Into<String>, values: &[f64]) -> Checked {
-    match kernel::finite(values) {
+    match all_finite(values) {
         true => Ok(()),
         false => Err(ControllerError::NotFinite {
             field: field.into(),

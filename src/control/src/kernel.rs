@@ -28,11 +28,6 @@ pub fn bound(values: &mut [f64]) {
     }
 }
 
-/// Whether every value is a finite number. All of them are looked at, so that several are at a time.
-pub fn finite(values: &[f64]) -> bool {
-    (values.iter()).fold(true, |finite, value| finite & value.is_finite())
-}
-
 /// The change of a bounded `value` that would change by `change`: none at a bound.
 pub fn bounded_change(value: f64, change: f64) -> f64 {
     if value.abs() < LARGEST { change } else { 0.0 }

@@ -4,7 +4,6 @@ mod serial;
 
 pub(crate) use serial::upper_triangle;
 
-use crate::kernel;
 use alloc::vec;
 use alloc::vec::Vec;
 
@@ -137,7 +136,7 @@ impl Matrix {
 
     /// Whether every entry is a finite number.
     pub fn is_finite(&self) -> bool {
-        kernel::finite(&self.entries)
+        all_finite(&self.entries)
     }
 
     /// Every entry multiplied by `factor`.
@@ -146,6 +145,11 @@ impl Matrix {
         self.entries.iter_mut().for_each(|entry| *entry *= factor);
         self
     }
+}
+
+/// Whether every value is a finite number. All of them are looked at, so that several are at a time.
+pub(crate) fn all_finite(values: &[f64]) -> bool {
+    (values.iter()).fold(true, |finite, value| finite & value.is_finite())
 }
 
 #[cfg(test)]
