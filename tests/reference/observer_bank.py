@@ -270,10 +270,10 @@ class Bank:
             and not self.first
             and not self.apart
             and not (self.trusts_model and self.suspect)
-            and self._is_undisputed(leading)
+            and self._leads_alone(leading)
         )
 
-    def _is_undisputed(self, leading: Hypothesis) -> bool:
+    def _leads_alone(self, leading: Hypothesis) -> bool:
         after = {id(h): h.score + self.seen[id(h)].likelihood for h in self.hypotheses}
         return all(
             self._stands_for(h, leading, h.mode) and h.mode != leading.mode and after[id(h)] <= after[id(leading)]
@@ -534,7 +534,7 @@ class Proposals:
         # What repeated its reading and does so no more has not frozen, unless in another way.
         self.resumed = h.stuck & bank.resumed
         self.stay = h.score + self.seen.likelihood + len(self.resumed) * self.log_rate["stuck"]
-        if h is not bank.best and self._has_come_to_nothing():
+        if h is not bank.best and self._has_vanished():
             self.stay -= self.tuning["fading"]
         self.valid = frozenset(np.flatnonzero(reading.valid).tolist())
         self.list = [Candidate("stay", self.stay, index, h.convinced, h.kinds, h.plant_changed)]
@@ -546,7 +546,7 @@ class Proposals:
         self._faults_change_or_end()
         return self.list
 
-    def _has_come_to_nothing(self) -> bool:
+    def _has_vanished(self) -> bool:
         h = self.h
         if not h.additive or h.additive != h.flagged or not h.convinced:
             return False

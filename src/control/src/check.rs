@@ -214,8 +214,8 @@ const LARGEST_WINDOW: usize = 10_000_000;
 const LARGEST_JOINT_STATE: usize = 1000;
 
 impl Estimator {
-    /// Whether the numbers that say how much memory a state takes are practical, so that nobody's
-    /// memory is asked for by a number alone; for a plant with this many `inputs`.
+    /// Whether the numbers that say how much memory a state takes are practical, so that no
+    /// number alone asks for more memory than there is; for a plant with this many `inputs`.
     ///
     /// # Errors
     /// The field that is too large.

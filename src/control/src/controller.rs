@@ -285,7 +285,8 @@ impl Controller {
         found.filter(|_| self.finds_the_mode())
     }
 
-    /// One tick: takes the sample and leaves the command in `state.command`.
+    /// One tick: takes the sample and leaves the command in `state.command`. State and sample are this controller's
+    /// ([`Controller::initial_state`], [`Controller::sample`]); of another's, only what both have is used.
     pub fn tick(&self, state: &mut ControllerState, sample: &Sample<'_>) {
         self.run(state, sample);
     }
@@ -303,7 +304,7 @@ impl Controller {
             bank.observe(judged, told, readings, sample.thresholds);
             // Every change of the command then looks like a fault.
             if state.delay.found().is_some() {
-                judged.believe(readings);
+                judged.accept_readings(readings);
             }
             state.estimator.adopt(settings, judged, readings);
             if self.finds_the_mode() && !sample.telling {
@@ -556,7 +557,7 @@ impl Controller {
                 .predict(gain, model, &state.acting, &state.corrected);
         }
         let settings = &self.parameters.estimator;
-        if state.estimator.leans_on_the_model(settings) {
+        if state.estimator.needs_open_loop(settings) {
             state.open_loop.advance(model, &state.acting);
         } else {
             state.open_loop.restart(state.observer.predicted());

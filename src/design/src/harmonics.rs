@@ -69,6 +69,9 @@ pub enum DisturbanceError {
 }
 
 impl KnownDisturbance {
+    /// How many harmonics, where no number is asked for: the fundamental.
+    pub const HARMONICS: usize = 1;
+
     /// Whether a controller sampled every `sample_time` seconds can learn it, where it has so many `channels`.
     ///
     /// # Errors
@@ -107,7 +110,7 @@ impl KnownDisturbance {
     pub fn new(period: f64) -> Self {
         Self {
             period,
-            harmonics: 1,
+            harmonics: Self::HARMONICS,
             amplitude: None,
         }
     }

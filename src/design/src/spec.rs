@@ -260,6 +260,9 @@ pub enum Objective {
 }
 
 impl ControlSpec {
+    /// The latency, in samples, where none is asked for.
+    pub const LATENCY: usize = 0;
+
     /// What is asked for where nothing else is: the first outputs are tracked, as many as there are
     /// inputs, and [`ControlSpec::tracking`] gives the rest.
     pub fn new(scaling: &Scaling) -> Self {
@@ -275,7 +278,7 @@ impl ControlSpec {
             nominal.map(|nominal| weight / nominal).collect()
         };
         Self {
-            latency: 0,
+            latency: Self::LATENCY,
             lyapunov: Lyapunov::Common,
             decay: DECAY,
             objective: Objective::Attenuation,

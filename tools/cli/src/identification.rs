@@ -2,6 +2,7 @@
 
 use crate::failure::{Failure, number, whole};
 use design_file::identification::{self, Asked, MOST_HARMONICS};
+use ftc_design::harmonics::KnownDisturbance;
 use std::path::{Path, PathBuf};
 
 /// The arguments of `identify`.
@@ -20,7 +21,7 @@ pub struct Arguments {
     /// Columns of the outputs; by default y[1], y[2] and so on.
     #[arg(long, value_delimiter = ',', value_name = "NAME,...")]
     outputs: Vec<String>,
-    /// Column of the time, where it is called neither t nor time.
+    /// Column of the time, where it has none of the usual names (t, time, timestamp).
     #[arg(long, value_name = "NAME")]
     time: Option<String>,
     /// Seconds between two rows, where no column tells the time.
@@ -30,7 +31,7 @@ pub struct Arguments {
     #[arg(long, value_name = "SECONDS", value_parser = number, allow_negative_numbers = true)]
     period: Option<f64>,
     /// Harmonics of that disturbance, the fundamental included.
-    #[arg(long, default_value_t = 1, requires = "period", allow_negative_numbers = true,
+    #[arg(long, default_value_t = KnownDisturbance::HARMONICS as u32, requires = "period", allow_negative_numbers = true,
           value_parser = whole::<u32>(1, MOST_HARMONICS as u64))]
     harmonics: u32,
     /// Number of states; by default the smallest that fits nearly as well as the best.

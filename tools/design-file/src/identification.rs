@@ -25,7 +25,7 @@ pub struct Asked {
     pub inputs: Vec<String>,
     /// Columns of the outputs; where empty `y[1]`, `y[2]` and so on.
     pub outputs: Vec<String>,
-    /// Column of the time, where it is called neither t nor time.
+    /// Column of the time, where it has none of the usual names (t, time, timestamp).
     pub time: Option<String>,
     /// Seconds between two rows, where no column tells the time.
     pub sample_time: Option<f64>,

@@ -7,6 +7,7 @@ use crate::notes::Notes;
 use crate::schema::{self, DesignFile, PlantModel};
 use crate::values::Matrix;
 use crate::wording;
+use ftc_design::ControlSpec;
 use ftc_design::words::counted;
 use ftc_plant::rows;
 use ftc_plant::{Dimensions, Mode, OperatingPoint, SwitchedPlant};
@@ -165,7 +166,13 @@ fn sampled_and_extended(
     if continuous {
         sample(&mut plant)?;
     }
-    extend(plant, given, file.controller.latency.unwrap_or(0))
+    extend(
+        plant,
+        given,
+        file.controller
+            .latency
+            .unwrap_or(ControlSpec::LATENCY as i64),
+    )
 }
 
 /// A named model, which is sampled and has no feedthrough.

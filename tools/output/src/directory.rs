@@ -37,7 +37,7 @@ pub struct Error {
 impl Error {
     /// A file that could not be written, of which the user names the directory.
     pub fn of_file(file: &Path, error: &io::Error) -> Self {
-        blame(file, error)
+        failed_at(file, error)
     }
 }
 
@@ -90,7 +90,7 @@ impl Staging {
         };
         let ((temporary, lock), unfinished) = Unfinished::make(prepare).map_err(|error| {
             remove(&made);
-            blame(out, &error)
+            failed_at(out, &error)
         })?;
         Ok(Self {
             out: out.to_path_buf(),
@@ -138,7 +138,7 @@ impl Staging {
             write(&mut file)?;
             file.sync_all()
         };
-        written().map_err(|error| blame(&self.out, &error))
+        written().map_err(|error| failed_at(&self.out, &error))
     }
 
     /// Moves every file into place and returns their paths in alphabetical order. Where one cannot
@@ -147,7 +147,7 @@ impl Staging {
     /// # Errors
     /// One sentence that names the file in the way, or the directory.
     pub fn commit(mut self) -> Result<Vec<PathBuf>, Error> {
-        let names = self.names().map_err(|error| blame(&self.out, &error))?;
+        let names = self.names().map_err(|error| failed_at(&self.out, &error))?;
         for name in &names {
             self.check_way(name)?;
         }
@@ -159,7 +159,7 @@ impl Staging {
             fs::rename(self.folder(), &ready)?;
             flush(&self.out)
         };
-        prepare().map_err(|error| blame(&self.out, &error))?;
+        prepare().map_err(|error| failed_at(&self.out, &error))?;
         let moved = exchange(&self.out, &ready, &names);
         // What is left of it is gone either way.
         fs::remove_dir_all(&ready).ok();
@@ -279,7 +279,7 @@ fn flush(folder: &Path) -> io::Result<()> {
     Ok(())
 }
 
-fn blame(out: &Path, error: &io::Error) -> Error {
+fn failed_at(out: &Path, error: &io::Error) -> Error {
     fault(out, unwritten(error, "directory"))
 }
 

@@ -88,10 +88,10 @@ pub fn of_runs(design: &Design, runs: &[(RunWatch<'_>, Option<u64>)]) -> Vec<Str
     let proof = design.proof.as_ref();
     let noise = proof.map_or(&[][..], |proof| &proof.running_loop.command_noise);
     let warnings = ftc_simulate::warnings::of_runs(design, noise, runs);
-    let calmer = calmer(design);
+    let smaller_command = smaller_command(design);
     warnings
         .iter()
-        .map(|warning| of_run(design, calmer, warning))
+        .map(|warning| of_run(design, smaller_command, warning))
         .collect()
 }
 
@@ -204,7 +204,7 @@ fn of_doubt(doubt: &Doubt) -> String {
 }
 
 /// What makes the command smaller.
-fn calmer(design: &Design) -> &'static str {
+fn smaller_command(design: &Design) -> &'static str {
     match SmallerCommand::of(design) {
         SmallerCommand::SlowerDecay => "ask for a slower decay",
         SmallerCommand::DecayObjective => {
@@ -228,7 +228,7 @@ fn missed(design: &Design) -> &'static str {
     }
 }
 
-fn of_run(design: &Design, calmer: &str, warning: &RunWarning) -> String {
+fn of_run(design: &Design, smaller_command: &str, warning: &RunWarning) -> String {
     let inputs = &design.signals.inputs;
     let percent = |share: f64| format!("{:.1} % of the samples", 100.0 * share);
     match *warning {
@@ -247,7 +247,7 @@ fn of_run(design: &Design, calmer: &str, warning: &RunWarning) -> String {
             number(widening.round())
         ),
         RunWarning::Saturated { input, share } => format!(
-            "ftc: {} is at a limit in {}, and what is proved holds only while no input is: {calmer}, \
+            "ftc: {} is at a limit in {}, and what is proved holds only while no input is: {smaller_command}, \
              or widen its min and max",
             inputs[input].name,
             percent(share)
@@ -281,7 +281,7 @@ fn of_run(design: &Design, calmer: &str, warning: &RunWarning) -> String {
         ),
         RunWarning::NoisyCommand { input, deviation } => format!(
             "ftc: the noise of the sensors moves {} by {} (standard deviation), more than a tenth of its range: \
-             {calmer}, or a slower observer.decay",
+             {smaller_command}, or a slower observer.decay",
             inputs[input].name,
             number(deviation)
         ),

@@ -227,7 +227,7 @@ impl EstimatorState {
     }
 
     /// Whether a flagged sensor has no trusted prediction to stand in for it.
-    pub fn leans_on_the_model(&self, estimator: &Estimator) -> bool {
+    pub fn needs_open_loop(&self, estimator: &Estimator) -> bool {
         if estimator.method == EstimatorMethod::Observer {
             return false;
         }

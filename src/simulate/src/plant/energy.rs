@@ -323,7 +323,7 @@ mod tests {
 
     /// Where the link falls to the diodes, the equations of motion are left to answer.
     #[test]
-    fn conducting_diodes_are_not_its_business() {
+    fn conducting_diodes_are_left_to_the_rectifier() {
         let plant = rectifier(2e-3);
         let sampled = Sampled::new(&plant, 5e-3).unwrap();
         let u = [-40.0, 40.0];

@@ -1,4 +1,5 @@
-//! Defines every BLAS symbol the solver links, as a static BLAS would, counts the calls, and designs.
+//! Defines every BLAS symbol the solver links, as a static BLAS would, counts the calls, and designs. No archive of
+//! another BLAS is linked: the symbols are this program's, and do what ftc-lapack does.
 #![allow(clippy::missing_safety_doc, clippy::too_many_arguments)]
 
 use ftc_design::{ControlSpec, Run, Solver, state_feedback};

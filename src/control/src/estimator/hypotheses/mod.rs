@@ -305,7 +305,7 @@ impl Bank {
             && !state.first
             && state.apart == 0
             && !(self.settings.trusts_model() && state.suspect != 0)
-            && self.undisputed(state);
+            && self.leads_alone(state);
         if nothing_happened {
             self.continue_all(state);
         } else {
@@ -600,7 +600,7 @@ impl BankState {
     }
 
     /// The sensors are believed, all whose readings `y` (p) are numbers: the loop is not the one that was designed.
-    pub fn believe(&mut self, y: &[f64]) {
+    pub fn accept_readings(&mut self, y: &[f64]) {
         self.flagged = 0;
         for (q, &value) in y.iter().enumerate().take(Sensors::BITS as usize) {
             self.flagged |= Sensors::from(!is_measurement(value)) << q;

@@ -88,7 +88,7 @@ impl Bank {
 
     /// Whether nothing stands beside the leading hypothesis but others of its kind in other modes, and
     /// explains the sample no better.
-    pub(super) fn undisputed(&self, state: &BankState) -> bool {
+    pub(super) fn leads_alone(&self, state: &BankState) -> bool {
         if state.in_use.count == 1 {
             return true;
         }

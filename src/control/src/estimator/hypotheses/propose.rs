@@ -58,7 +58,7 @@ impl Bank {
         state.expectation.stale = true;
         // What repeated its reading and does so no more has not frozen, unless in another way.
         parent.stay += f64::from((h.stuck & state.resumed).count_ones()) * self.log_rates.stuck;
-        if slot != state.best && self.has_come_to_nothing(h, reading) {
+        if slot != state.best && self.has_vanished(h, reading) {
             parent.stay -= self.tuning.fading;
         }
         state
@@ -70,7 +70,7 @@ impl Bank {
     }
 
     /// Whether the faults of a hypothesis, biases all of them, are none any more.
-    fn has_come_to_nothing(&self, h: &Hypothesis, reading: Reading<'_>) -> bool {
+    fn has_vanished(&self, h: &Hypothesis, reading: Reading<'_>) -> bool {
         let (fault, stride) = (self.layout.fault(), self.layout.stride());
         let biases = h.additive != 0 && h.additive == h.flagged() && h.convinced;
         let mut faults = (0..self.layout.p).filter(|&q| has(h.additive, q));
