@@ -22,7 +22,7 @@ FILE = re.compile(r"[\w*./-]*/[\w*.-]*|[\w*-]+\.(?:rs|py|sh|md|toml|json)|Makefi
 METAPHORS = re.compile(
     rb"\b(?:Dice|dice|Lottery|lottery|hasty|blip|bearable|SILENCE|ROOM|HASTE|Road|Contender|slowest_step|thickened"
     rb"|Trust|Truth|Play|Frame|lives on|leans on|hair of the|beyond suspicion|usual ways out|fault that hides"
-    rb"|played|struck|aside|Loosen|Tighten)\b"
+    rb"|played|struck|aside|Loosen|Tighten|leans_on_the_model|has_come_to_nothing|undisputed|calmer)\b"
 )
 SYMBOL = re.compile(r"[A-Za-z_]\w*(?:::\w+)*")
 

@@ -190,10 +190,9 @@ fn deviation(design: &DesignRecord, departure: Departure) -> Deviation {
 
 /// The largest value of a disturbance in the scenario, or one.
 fn height(design: &DesignRecord, channel: usize) -> f64 {
-    let te = design.plant.sample_time;
     let signal = &design.scenario.disturbance[channel];
-    let values = (0..design.scenario.steps).map(|tick| signal.at(tick, te).abs());
-    let largest = values.fold(0.0, f64::max);
+    let [low, high] = signal.range(design.scenario.steps, design.plant.sample_time);
+    let largest = high.max(-low);
     if largest > 0.0 { largest } else { 1.0 }
 }
 

@@ -599,7 +599,7 @@ impl BankState {
             && self.slots.iter().all(exists)
     }
 
-    /// The sensors are believed, all whose readings `y` (p) are numbers: the loop is not the one that was designed.
+    /// Takes every sensor for healthy whose readings `y` (p) are numbers: the loop is not the one that was designed.
     pub fn accept_readings(&mut self, y: &[f64]) {
         self.flagged = 0;
         for (q, &value) in y.iter().enumerate().take(Sensors::BITS as usize) {
